@@ -1,0 +1,190 @@
+//! The envelope that the policy cannot leave: which actions are allowed here and now.
+//!
+//! A move is allowed when it stays inside the fence and when the battery, after paying for it, still covers the
+//! way to the terminal cell plus a reserve:
+//!
+//! ```text
+//! b - cost(a) >= distance(p + a, terminal) + reserve          (paper, "safety controller")
+//! ```
+//!
+//! # Glossary
+//! - **fence**: the set of cells that may be flown over. It lies inside the map.
+//! - **distance**: moves on the shortest path to the terminal that stays inside the fence.
+//! - **way home**: battery units still needed to *end* the mission. That is the distance, except on the terminal
+//!   cell itself: a mission ends when a *move* enters the terminal, so from there it takes two moves, out and
+//!   back. (With the plain distance, a mission that starts on its terminal could hover until no move is
+//!   affordable any more, and never end.)
+//! - **feasible**: the battery covers way home plus reserve.
+//!
+//! # The theorem
+//! From a feasible state at least one action is allowed, and every allowed action leads to a feasible state or
+//! ends the mission on the terminal with `b >= reserve`. By induction the terminal is always reached, whatever
+//! the policy answers. `tests/theorem.rs` walks every state of small grids and random walks of large ones.
+//!
+//! # When you may trust this
+//! The theorem speaks of the battery it is told and of cells. That a cell is really reached at the price of one
+//! unit is the pilot's to watch; when the battery falls faster than that, the state becomes infeasible, and then
+//! [`Guard::mask`] leaves only moves that shorten the way home. The guard does not know that learning exists.
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
+
+mod distance;
+
+use core::fmt;
+use distance::DistanceField;
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet, Grid};
+
+/// Fence, terminal and reserve, with the distances worked out. About four kilobytes.
+#[derive(Clone, Debug)]
+pub struct Guard {
+    terminal: Cell,
+    reserve: BatteryUnits,
+    distances: DistanceField,
+}
+
+/// Why there can be no envelope.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GuardError {
+    /// The terminal cell is outside the fence.
+    TerminalOutsideFence,
+    /// No cell next to the terminal is inside the fence: no move can ever end the mission.
+    TerminalIsolated,
+    /// The reserve is negative or not finite.
+    Reserve,
+}
+
+impl fmt::Display for GuardError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            GuardError::TerminalOutsideFence => "the terminal cell is outside the fence",
+            GuardError::TerminalIsolated => "no cell next to the terminal is inside the fence",
+            GuardError::Reserve => "the reserve is not a number of battery units >= 0",
+        })
+    }
+}
+
+impl core::error::Error for GuardError {}
+
+impl Guard {
+    /// Works out the distances inside `fence`, a breadth-first search from `terminal`.
+    ///
+    /// # Errors
+    /// See [`GuardError`].
+    ///
+    /// # Cost
+    /// One visit per cell; 4 KB of stack.
+    pub fn new(fence: &CellSet, terminal: Cell, reserve: BatteryUnits) -> Result<Guard, GuardError> {
+        check_reserve(reserve)?;
+        if !fence.contains(terminal) {
+            return Err(GuardError::TerminalOutsideFence);
+        }
+        if !Action::MOVES.iter().any(|&action| fence.contains(terminal.after(action))) {
+            return Err(GuardError::TerminalIsolated);
+        }
+        Ok(Guard { terminal, reserve, distances: DistanceField::new(fence, terminal) })
+    }
+
+    /// Changes the reserve (`GLN_RESERVE`).
+    ///
+    /// # Errors
+    /// [`GuardError::Reserve`]; the old value stays.
+    pub fn set_reserve(&mut self, reserve: BatteryUnits) -> Result<(), GuardError> {
+        check_reserve(reserve)?;
+        self.reserve = reserve;
+        Ok(())
+    }
+
+    /// The grid of the fence.
+    #[must_use]
+    pub const fn grid(&self) -> Grid {
+        self.distances.grid()
+    }
+
+    /// The cell that ends the mission.
+    #[must_use]
+    pub const fn terminal(&self) -> Cell {
+        self.terminal
+    }
+
+    /// The battery that is kept back.
+    #[must_use]
+    pub const fn reserve(&self) -> BatteryUnits {
+        self.reserve
+    }
+
+    /// Moves to the terminal on the shortest path inside the fence; `None` outside it or cut off from it.
+    #[must_use]
+    pub fn distance(&self, cell: Cell) -> Option<u16> {
+        self.distances.at(cell)
+    }
+
+    /// Battery units still needed to end the mission: the distance, and 2 on the terminal itself.
+    #[must_use]
+    pub fn way_home(&self, cell: Cell) -> Option<BatteryUnits> {
+        let distance = self.distance(cell)?;
+        Some(BatteryUnits(if distance == 0 { 2.0 } else { f32::from(distance) }))
+    }
+
+    /// Battery beyond the way to the terminal: the paper's b_SC, `b - distance`. The reserve is not taken off,
+    /// so that the policy sees the same number whatever the operator keeps back.
+    #[must_use]
+    pub fn spare(&self, cell: Cell, battery: BatteryUnits) -> Option<BatteryUnits> {
+        self.distance(cell).map(|distance| battery - BatteryUnits(f32::from(distance)))
+    }
+
+    /// Whether the battery covers the way home and the reserve. Never for a battery that is not a number.
+    #[must_use]
+    pub fn is_feasible(&self, cell: Cell, battery: BatteryUnits) -> bool {
+        self.way_home(cell).is_some_and(|needed| battery.0 >= (needed + self.reserve).0)
+    }
+
+    /// The actions allowed at `cell` with `battery` left.
+    ///
+    /// From an infeasible state these are the moves that shorten the way (on the terminal: hover), the best that
+    /// is left to do. Empty only where [`Guard::distance`] is `None`.
+    #[must_use]
+    pub fn mask(&self, cell: Cell, battery: BatteryUnits) -> ActionMask {
+        if !self.is_feasible(cell, battery) {
+            return self.homeward_moves(cell);
+        }
+        let mut mask = ActionMask::EMPTY;
+        for action in Action::ALL {
+            let next = cell.after(action);
+            let needed = match action {
+                // Hovering on the terminal does not end the mission, moving onto it does.
+                Action::Hover => self.way_home(next),
+                _ => self.distance(next).map(|distance| BatteryUnits(f32::from(distance))),
+            };
+            if needed.is_some_and(|needed| (battery - action.cost()).0 >= (needed + self.reserve).0) {
+                mask = mask.with(action);
+            }
+        }
+        mask
+    }
+
+    /// The first move that shortens the way to the terminal; `None` on the terminal and outside the fence.
+    #[must_use]
+    pub fn homeward(&self, cell: Cell) -> Option<Action> {
+        self.homeward_moves(cell).iter().find(|&action| action != Action::Hover)
+    }
+
+    fn homeward_moves(&self, cell: Cell) -> ActionMask {
+        match self.distance(cell) {
+            None => ActionMask::EMPTY,
+            Some(0) => ActionMask::EMPTY.with(Action::Hover),
+            Some(here) => Action::MOVES
+                .into_iter()
+                .filter(|&action| self.distance(cell.after(action)).is_some_and(|there| there < here))
+                .fold(ActionMask::EMPTY, ActionMask::with),
+        }
+    }
+}
+
+fn check_reserve(reserve: BatteryUnits) -> Result<(), GuardError> {
+    if reserve.0.is_finite() && reserve.0 >= 0.0 { Ok(()) } else { Err(GuardError::Reserve) }
+}

@@ -1,0 +1,94 @@
+//! A set of cells in a quarter of a kilobyte: the fence.
+
+use crate::{Cell, Grid, MAX_CELLS};
+
+const WORDS: usize = MAX_CELLS / 32;
+
+/// A set of cells of one grid, one bit each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CellSet {
+    grid: Grid,
+    words: [u32; WORDS],
+}
+
+impl CellSet {
+    /// No cell of `grid`.
+    #[must_use]
+    pub const fn empty(grid: Grid) -> CellSet {
+        CellSet { grid, words: [0; WORDS] }
+    }
+
+    /// Every cell of `grid`.
+    #[must_use]
+    pub fn full(grid: Grid) -> CellSet {
+        let mut set = CellSet::empty(grid);
+        for cell in grid.cells() {
+            set.insert(cell);
+        }
+        set
+    }
+
+    /// The grid whose cells these are.
+    #[must_use]
+    pub const fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    /// Adds a cell; a cell outside the grid changes nothing.
+    pub fn insert(&mut self, cell: Cell) {
+        if let Some((word, bit)) = self.place(cell)
+            && let Some(word) = self.words.get_mut(word)
+        {
+            *word |= bit;
+        }
+    }
+
+    /// Takes a cell out.
+    pub fn remove(&mut self, cell: Cell) {
+        if let Some((word, bit)) = self.place(cell)
+            && let Some(word) = self.words.get_mut(word)
+        {
+            *word &= !bit;
+        }
+    }
+
+    /// Whether the cell is in the set; never for a cell outside the grid.
+    #[must_use]
+    pub fn contains(&self, cell: Cell) -> bool {
+        self.place(cell).is_some_and(|(word, bit)| self.words.get(word).is_some_and(|w| w & bit != 0))
+    }
+
+    /// How many cells are in the set.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// Whether no cell is in the set.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.words.iter().all(|&word| word == 0)
+    }
+
+    fn place(&self, cell: Cell) -> Option<(usize, u32)> {
+        self.grid.index(cell).map(|index| (index / 32, 1 << (index % 32)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Metres;
+
+    #[test]
+    fn a_set_holds_what_was_put_in_and_nothing_outside_the_grid() {
+        let grid = Grid::new(7, 5, Metres(20.0)).unwrap();
+        let mut set = CellSet::full(grid);
+        assert_eq!(set.len(), 35);
+        set.remove(Cell::new(6, 4));
+        set.insert(Cell::new(7, 4));
+        assert_eq!(set.len(), 34);
+        assert!(!set.contains(Cell::new(6, 4)) && !set.contains(Cell::new(7, 4)) && set.contains(Cell::new(0, 0)));
+        assert!(CellSet::empty(grid).is_empty());
+    }
+}
