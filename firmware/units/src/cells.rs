@@ -88,7 +88,9 @@ mod tests {
         set.remove(Cell::new(6, 4));
         set.insert(Cell::new(7, 4));
         assert_eq!(set.len(), 34);
-        assert!(!set.contains(Cell::new(6, 4)) && !set.contains(Cell::new(7, 4)) && set.contains(Cell::new(0, 0)));
+        assert!(
+            !set.contains(Cell::new(6, 4)) && !set.contains(Cell::new(7, 4)) && set.contains(Cell::new(0, 0))
+        );
         assert!(CellSet::empty(grid).is_empty());
     }
 }

@@ -131,11 +131,7 @@ impl Grid {
     /// Row-major index from the south-west corner, below [`Grid::len`]; `None` outside.
     #[must_use]
     pub const fn index(&self, cell: Cell) -> Option<usize> {
-        if self.contains(cell) {
-            Some(cell.y as usize * self.width as usize + cell.x as usize)
-        } else {
-            None
-        }
+        if self.contains(cell) { Some(cell.y as usize * self.width as usize + cell.x as usize) } else { None }
     }
 
     /// The cell with this index; `None` at or above [`Grid::len`].

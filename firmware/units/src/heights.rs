@@ -67,8 +67,11 @@ impl HeightMap {
         let height = rows().count();
         let width = rows().next().map_or(0, |(_, line)| line.split(',').count());
         let side = |count: usize| u16::try_from(count).unwrap_or(u16::MAX);
-        let grid = Grid::new(side(width), side(height), cell)
-            .map_err(|error| CsvError { line: 1, column: 1, fault: CsvFault::Grid(error) })?;
+        let grid = Grid::new(side(width), side(height), cell).map_err(|error| CsvError {
+            line: 1,
+            column: 1,
+            fault: CsvFault::Grid(error),
+        })?;
         let mut map = HeightMap::flat(grid);
         for (row, (line, text)) in rows().enumerate() {
             let mut columns = 0;

@@ -1,0 +1,153 @@
+//! The observation contract: every number that enters the model, with its unit, scale and meaning when absent.
+//!
+//! [`hash`] over this table is stored in each model. A runtime whose table differs refuses the model, so the
+//! table cannot drift apart between the trainer and an aircraft.
+
+use crate::{K_MAX, LOCAL_MAP_SIDE, TOKENS};
+use core::fmt::{self, Write};
+
+/// One number of a token.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feature {
+    /// The ONNX input that holds it.
+    pub tensor: &'static str,
+    /// Position within the token.
+    pub index: usize,
+    /// Its name.
+    pub name: &'static str,
+    /// The physical unit in which it enters the graph.
+    pub unit: &'static str,
+    /// How the graph normalises it.
+    pub normalisation: Normalisation,
+    /// What the number is when the quantity is not known.
+    pub when_absent: &'static str,
+}
+
+/// `((x + shift) / scale)`, clipped to `[low, high]`: done inside the graph, stated here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Normalisation {
+    /// Added first, in the physical unit.
+    pub shift: f32,
+    /// Divided by then, in the physical unit.
+    pub scale: f32,
+    /// Lower clip, normalised; minus infinity for none.
+    pub low: f32,
+    /// Upper clip, normalised; infinity for none.
+    pub high: f32,
+}
+
+impl Normalisation {
+    const fn scale(scale: f32) -> Normalisation {
+        Normalisation { shift: 0.0, scale, low: f32::NEG_INFINITY, high: f32::INFINITY }
+    }
+
+    /// The number that the network's first layer sees.
+    #[must_use]
+    pub fn apply(&self, physical: f32) -> f32 {
+        ((physical + self.shift) / self.scale).clamp(self.low, self.high)
+    }
+}
+
+/// Battery numbers: battery units / 40.
+pub const BATTERY: Normalisation = Normalisation::scale(40.0);
+/// Offsets, the same on both axes: metres / 400.
+pub const OFFSET: Normalisation = Normalisation::scale(400.0);
+/// Remaining data: data units / 8000, the largest initial load.
+pub const REMAINING: Normalisation = Normalisation::scale(8000.0);
+/// SNR: (dB + 8) / 13, clipped to [-2, 2.7]; median -16 dB and maximum 21.5 dB in the default city.
+pub const SNR: Normalisation = Normalisation { shift: 8.0, scale: 13.0, low: -2.0, high: 2.7 };
+/// Numbers that are near one already.
+pub const PLAIN: Normalisation = Normalisation::scale(1.0);
+/// Building heights: metres / 50.
+pub const HEIGHT: Normalisation = Normalisation::scale(50.0);
+
+/// The SNR that stands for "not heard": normalised, the lower clip.
+pub const SNR_NOT_HEARD_DB: f32 = -34.0;
+/// SNR from which on a device's data flows (paper, Sigma), so that it counts as reachable.
+pub const REACHABLE_SNR_DB: f32 = 5.0;
+/// The building height that stands for "outside the map".
+pub const OUTSIDE_HEIGHT_M: f32 = 50.0;
+
+const NEVER: &str = "never absent";
+
+const fn feature(
+    tensor: &'static str,
+    index: usize,
+    name: &'static str,
+    unit: &'static str,
+    normalisation: Normalisation,
+    when_absent: &'static str,
+) -> Feature {
+    Feature { tensor, index, name, unit, normalisation, when_absent }
+}
+
+/// The table. The local map is one row: its cells are alike, `(dy + 5) * 10 + (dx + 5)` with dx, dy in -5..=4.
+pub const FEATURES: [Feature; 12] = [
+    feature("uav", 0, "spare_battery", "battery units", BATTERY, NEVER),
+    feature("uav", 1, "battery", "battery units", BATTERY, NEVER),
+    feature("uav", 2, "terminal_east", "m", OFFSET, NEVER),
+    feature("uav", 3, "terminal_north", "m", OFFSET, NEVER),
+    feature("devices", 0, "device_east", "m", OFFSET, "row of zeros, masked"),
+    feature("devices", 1, "device_north", "m", OFFSET, "row of zeros, masked"),
+    feature("devices", 2, "remaining", "data units", REMAINING, "last known, at first the mission's"),
+    feature("devices", 3, "snr", "dB", SNR, "-34 when not heard or stale"),
+    feature("devices", 4, "reachable", "0 or 1", PLAIN, "0 when not heard or stale"),
+    feature("preference", 0, "w_data", "1", PLAIN, NEVER),
+    feature("preference", 1, "w_energy", "1", PLAIN, NEVER),
+    feature("local_map", 0, "height", "m", HEIGHT, "50 outside the map"),
+];
+
+/// The normalisations of one tensor, in index order.
+pub fn normalisations(tensor: &str) -> impl Iterator<Item = Normalisation> {
+    FEATURES.iter().filter(move |feature| feature.tensor == tensor).map(|feature| feature.normalisation)
+}
+
+/// FNV-1a (64 bit) over the table, the token counts and the action order: the model's `schema_hash`.
+#[must_use]
+pub fn hash() -> u64 {
+    let mut text = Fnv1a(0xcbf2_9ce4_8422_2325);
+    // Writing into a hash cannot fail.
+    let _ = write!(text, "{FEATURES:?} {K_MAX} {LOCAL_MAP_SIDE} {TOKENS} {REACHABLE_SNR_DB:?}");
+    for action in gleaner_units::Action::ALL {
+        let _ = write!(text, " {}", action.name());
+    }
+    text.0
+}
+
+struct Fnv1a(u64);
+
+impl Write for Fnv1a {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for byte in text.bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_contract_changes_only_on_purpose() {
+        // A new value here means that every model trained before is refused: that must be a decision.
+        assert_eq!(hash(), 0x2fa0_e930_2bd9_1720, "schema hash is {:#018x}", hash());
+    }
+
+    #[test]
+    fn indices_count_up_within_each_tensor() {
+        for pair in FEATURES.windows(2) {
+            let same = pair[0].tensor == pair[1].tensor;
+            assert_eq!(pair[1].index, if same { pair[0].index + 1 } else { 0 });
+        }
+    }
+
+    #[test]
+    fn not_heard_is_the_lower_clip() {
+        assert_eq!(SNR.apply(SNR_NOT_HEARD_DB), SNR.low);
+        assert_eq!(SNR.apply(100.0), 2.7);
+        assert_eq!(SNR.apply(5.0), 1.0);
+        assert_eq!(HEIGHT.apply(OUTSIDE_HEIGHT_M), 1.0);
+    }
+}

@@ -1,0 +1,203 @@
+//! From a situation to the arrays that enter the model.
+
+use crate::schema::{OUTSIDE_HEIGHT_M, REACHABLE_SNR_DB, SNR_NOT_HEARD_DB};
+use crate::{DeviceState, K_MAX, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE, Situation};
+use gleaner_units::Cell;
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Numbers of the aircraft's token.
+pub(crate) const UAV_FEATURES: usize = 4;
+/// Numbers of a device's token.
+pub(crate) const DEVICE_FEATURES: usize = 5;
+
+/// The model's input in physical units, in [`crate::schema`] order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tokens {
+    /// Spare battery, battery (battery units), terminal east, north (m).
+    pub uav: [f32; UAV_FEATURES],
+    /// `w_data`, `w_energy`.
+    pub preference: [f32; 2],
+    /// Building heights around the aircraft (m), south-west first, row by row.
+    pub local_map: Vec<f32, LOCAL_MAP_CELLS>,
+    /// East, north (m), remaining (data units), SNR (dB), reachable: the devices that are present.
+    pub devices: Vec<[f32; DEVICE_FEATURES], K_MAX>,
+}
+
+/// Which device of the mission stands in which device token: the index into the list given to
+/// [`Tokens::build`].
+pub type Slots = Vec<u16, K_MAX>;
+
+impl Tokens {
+    /// The tokens of a situation, and which device went into which token.
+    ///
+    /// With more than [`K_MAX`] devices, those with the highest SNR are seen, of equals (all that are not heard)
+    /// the nearest. Devices keep their order.
+    ///
+    /// # Cost
+    /// One pass over the devices and one over the local map; no heap.
+    pub fn build(
+        situation: &Situation<'_>,
+        devices: impl IntoIterator<Item = DeviceState>,
+    ) -> (Tokens, Slots) {
+        let cell_m = situation.heights.grid().cell().0;
+        let offset_m = |to: Cell| {
+            let from = situation.cell;
+            [(f32::from(to.x) - f32::from(from.x)) * cell_m, (f32::from(to.y) - f32::from(from.y)) * cell_m]
+        };
+        let [terminal_east_m, terminal_north_m] = offset_m(situation.terminal);
+        let mut tokens = Tokens {
+            uav: [situation.spare.0, situation.battery.0, terminal_east_m, terminal_north_m],
+            preference: [situation.preference.w_data(), situation.preference.w_energy()],
+            local_map: local_map(situation),
+            devices: Vec::new(),
+        };
+        let mut slots = Slots::new();
+        for (index, device) in devices.into_iter().enumerate() {
+            let [east_m, north_m] = offset_m(device.cell);
+            let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
+            let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
+            let token = [
+                east_m,
+                north_m,
+                if device.remaining.is_finite() { device.remaining.max(0.0) } else { 0.0 },
+                snr_db.unwrap_or(SNR_NOT_HEARD_DB),
+                f32::from(u8::from(reachable)),
+            ];
+            if tokens.devices.is_full() {
+                replace_weakest(&mut tokens.devices, &mut slots, token, index);
+            } else {
+                let _ = tokens.devices.push(token);
+                let _ = slots.push(index as u16);
+            }
+        }
+        (tokens, slots)
+    }
+}
+
+/// Highest SNR first, then nearest.
+fn precedes(a: &[f32; DEVICE_FEATURES], b: &[f32; DEVICE_FEATURES]) -> bool {
+    let rank = |&[east_m, north_m, _, snr_db, _]: &[f32; DEVICE_FEATURES]| {
+        (snr_db, -(east_m * east_m + north_m * north_m))
+    };
+    rank(a) > rank(b)
+}
+
+/// Puts `token` in place of the weakest one if it is stronger; later devices stay behind earlier ones.
+fn replace_weakest(
+    tokens: &mut Vec<[f32; DEVICE_FEATURES], K_MAX>,
+    slots: &mut Slots,
+    token: [f32; DEVICE_FEATURES],
+    index: usize,
+) {
+    let weakest = tokens
+        .iter()
+        .enumerate()
+        .reduce(|worst, next| if precedes(next.1, worst.1) { worst } else { next })
+        .filter(|(_, weakest)| precedes(&token, weakest))
+        .map(|(slot, _)| slot);
+    if let Some(slot) = weakest {
+        tokens.remove(slot);
+        slots.remove(slot);
+        let _ = tokens.push(token);
+        let _ = slots.push(index as u16);
+    }
+}
+
+fn local_map(situation: &Situation<'_>) -> Vec<f32, LOCAL_MAP_CELLS> {
+    let half = (LOCAL_MAP_SIDE / 2) as i16;
+    let mut map = Vec::new();
+    for north in -half..half {
+        for east in -half..half {
+            let Cell { x, y } = situation.cell;
+            let cell = Cell::new(x.saturating_add(east), y.saturating_add(north));
+            let height_m = situation.heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |height| height.0);
+            let _ = map.push(height_m);
+        }
+    }
+    map
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Preference;
+    use gleaner_units::{BatteryUnits, Db, Grid, HeightMap, Metres};
+    use proptest::prelude::*;
+
+    fn city() -> HeightMap {
+        let mut heights = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
+        heights.set(Cell::new(12, 7), 33);
+        heights
+    }
+
+    fn situation(heights: &HeightMap, x: i16, y: i16) -> Situation<'_> {
+        Situation {
+            cell: Cell::new(x, y),
+            battery: BatteryUnits(80.0),
+            spare: BatteryUnits(48.0),
+            terminal: Cell::new(30, 18),
+            preference: Preference::new(0.25).unwrap(),
+            heights,
+        }
+    }
+
+    #[test]
+    fn offsets_are_metres_east_and_north_and_absence_has_one_meaning() {
+        let heights = city();
+        let heard = DeviceState { cell: Cell::new(11, 4), remaining: 6000.0, snr: Some(Db(5.0)) };
+        let unheard = DeviceState { snr: None, ..heard };
+        let broken = DeviceState { snr: Some(Db(f32::NAN)), remaining: f32::NAN, ..heard };
+        let (tokens, slots) = Tokens::build(&situation(&heights, 10, 6), [heard, unheard, broken]);
+        assert_eq!(tokens.uav, [48.0, 80.0, 400.0, 240.0]);
+        assert_eq!(tokens.preference, [0.25, 0.75]);
+        assert_eq!(tokens.devices[0], [20.0, -40.0, 6000.0, 5.0, 1.0]);
+        assert_eq!(tokens.devices[1], [20.0, -40.0, 6000.0, SNR_NOT_HEARD_DB, 0.0]);
+        assert_eq!(tokens.devices[2], [20.0, -40.0, 0.0, SNR_NOT_HEARD_DB, 0.0]);
+        assert_eq!(slots.as_slice(), [0, 1, 2]);
+    }
+
+    #[test]
+    fn the_local_map_reaches_five_cells_south_and_west_and_four_north_and_east() {
+        let heights = city();
+        let (tokens, _) = Tokens::build(&situation(&heights, 10, 6), []);
+        assert_eq!(tokens.local_map.len(), LOCAL_MAP_CELLS);
+        assert_eq!(tokens.local_map[(1 + 5) * 10 + (2 + 5)], 33.0);
+        assert_eq!(tokens.local_map.iter().filter(|&&height_m| height_m == 0.0).count(), 99);
+        let (corner, _) = Tokens::build(&situation(&heights, 0, 0), []);
+        assert_eq!(corner.local_map.iter().filter(|&&height_m| height_m == 50.0).count(), 75);
+        assert_eq!(corner.local_map[5 * 10 + 5], 0.0, "the aircraft's own cell");
+    }
+
+    proptest! {
+        #[test]
+        fn of_too_many_devices_the_strongest_are_seen(
+            snrs in prop::collection::vec(prop::option::of(-30i16..25), 0..40),
+        ) {
+            let heights = city();
+            let devices: std::vec::Vec<DeviceState> = snrs
+                .iter()
+                .enumerate()
+                .map(|(index, snr)| DeviceState {
+                    cell: Cell::new(index as i16, 3),
+                    remaining: index as f32,
+                    snr: snr.map(|db| Db(f32::from(db))),
+                })
+                .collect();
+            let (tokens, slots) = Tokens::build(&situation(&heights, 10, 6), devices.iter().copied());
+            prop_assert_eq!(tokens.devices.len(), devices.len().min(K_MAX));
+            prop_assert!(slots.windows(2).all(|pair| pair[0] < pair[1]), "mission order");
+            let key = |device: &DeviceState| {
+                (device.snr.map_or(SNR_NOT_HEARD_DB, |snr| snr.0), -(device.cell.x - 10).abs())
+            };
+            for (slot, token) in slots.iter().zip(&tokens.devices) {
+                prop_assert_eq!(f32::from(*slot), token[2], "slot names the device in the token");
+            }
+            for (index, unseen) in devices.iter().enumerate().filter(|(i, _)| !slots.contains(&(*i as u16))) {
+                for &slot in &slots {
+                    prop_assert!(key(unseen) <= key(&devices[slot as usize]), "{} over {}", slot, index);
+                }
+            }
+        }
+    }
+}
