@@ -1,0 +1,53 @@
+//! The pilot: `poll(now, inputs) -> outputs`, the machine that flies the mission.
+//!
+//! It decides once per cell what the aircraft does next, and it decides at every poll whether it may do anything
+//! at all. It has no clock, no port and no heap; a program hands it bytes and the time, and carries its bytes
+//! away.
+//!
+//! # Glossary
+//! - **mission**: the city, the fence, the terminal, the devices, the battery that may be used. Fixed in flight.
+//! - **request**: what the operator asks for: off, engage, shadow, return. Nothing engages without one.
+//! - **engaged**: the policy flies. **Homing**: the guard flies the shortest way to the terminal, then lands.
+//! - **passive**: the human pilot (or a failsafe) has the aircraft. The machine is silent until a new request.
+//! - **shadow**: decides and logs as if engaged, commands nothing.
+//! - **guided**: the autopilot follows our targets: GUIDED on ArduPilot, OFFBOARD on PX4. The machine never asks
+//!   for that mode and never arms; both are the operator's.
+//! - **leg**: the flight to one cell centre, or the hover over it for one slot.
+//! - **slot**: the time that a move takes, cell length / `GLN_SPEED`; a hover lasts one slot.
+//! - **ledger**: battery units left by the guard's arithmetic, capped by what the autopilot measures.
+//!
+//! # Pieces
+//! [`Machine`] is the state machine over typed inputs. [`Onboard`] puts the MAVLink endpoint, the radio decoder
+//! and the device table around it: bytes in, bytes out. Programs use [`Onboard`].
+//!
+//! # When you may trust this
+//! Every target is the centre of a cell that the guard allowed, at the altitude above home that was set when the
+//! mission was engaged, and finite. Setpoints, heartbeat and decisions hang off the same `poll`: when it stops,
+//! all of them stop. The battery theorem holds as far as a move really costs one unit; see the crate
+//! `gleaner-guard`.
+//!
+//! # Features
+//! `std` adds `mission_file`: mission files as TOML text.
+#![cfg_attr(not(any(test, feature = "std")), no_std)]
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+#![cfg_attr(
+    not(test),
+    deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
+)]
+
+mod decision;
+mod machine;
+mod mission;
+mod onboard;
+mod parameters;
+mod state;
+mod vehicle;
+
+pub use decision::{Decision, DecisionRecord, RECORD_BYTES_MAX};
+pub use machine::{Command, Inputs, Machine, Notice, Outputs, Request, Severity, Telemetry};
+pub use mission::{DeviceSite, MAX_DEVICES, Mission, MissionError};
+pub use onboard::{Onboard, Settings, Stats};
+pub use parameters::{Enable, PARAMETERS, ParameterError, ParameterSpec, Parameters};
+pub use state::{Fault, Missing, ReturnReason, State};
+pub use vehicle::{Autopilot, Mode, Vehicle};

@@ -1,0 +1,133 @@
+//! The mission: everything that is fixed before take-off.
+
+use core::fmt;
+use gleaner_guard::{Guard, GuardError};
+use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// The most devices in one mission.
+pub const MAX_DEVICES: usize = 64;
+
+/// One ground device as the mission knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceSite {
+    /// The number that its radio reports carry.
+    pub id: u16,
+    /// Where it stands.
+    pub cell: Cell,
+    /// Data that it holds at the start, data units.
+    pub data: f32,
+}
+
+/// City, fence, terminal, battery budget, devices. About five kilobytes, no heap.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mission {
+    /// The city.
+    pub heights: HeightMap,
+    /// The cells that may be flown over.
+    pub fence: CellSet,
+    /// South-west corner of cell (0, 0).
+    pub corner: GeoPoint,
+    /// The cell that ends the mission; the aircraft lands there.
+    pub terminal: Cell,
+    /// The most battery that the mission may use (paper, B).
+    pub budget: BatteryUnits,
+    /// The devices, in the order that decisions name them.
+    pub devices: Vec<DeviceSite, MAX_DEVICES>,
+}
+
+/// Why a mission cannot be flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissionError {
+    /// The fence belongs to another grid than the city.
+    FenceGrid,
+    /// Fence and terminal allow no way home.
+    Guard(GuardError),
+    /// The corner is no point of the globe.
+    Corner,
+    /// The battery budget is not a positive number.
+    Budget,
+    /// This device stands outside the city.
+    DeviceOutside {
+        /// Its id.
+        id: u16,
+    },
+    /// Two devices have this id.
+    DuplicateDevice {
+        /// The id.
+        id: u16,
+    },
+    /// This device's data is negative or not a number.
+    DeviceData {
+        /// Its id.
+        id: u16,
+    },
+}
+
+impl fmt::Display for MissionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            MissionError::FenceGrid => write!(f, "the fence belongs to another grid than the city"),
+            MissionError::Guard(error) => write!(f, "{error}"),
+            MissionError::Corner => write!(f, "the grid's corner is not a latitude and longitude"),
+            MissionError::Budget => write!(f, "battery_units is not a number above 0"),
+            MissionError::DeviceOutside { id } => write!(f, "device {id} stands outside the city"),
+            MissionError::DuplicateDevice { id } => write!(f, "two devices have the id {id}"),
+            MissionError::DeviceData { id } => write!(f, "the data of device {id} is not a number >= 0"),
+        }
+    }
+}
+
+impl core::error::Error for MissionError {}
+
+impl Mission {
+    /// The grid of the city.
+    #[must_use]
+    pub const fn grid(&self) -> Grid {
+        self.heights.grid()
+    }
+
+    /// Data of all devices at the start, data units.
+    #[must_use]
+    pub fn initial_data(&self) -> f32 {
+        self.devices.iter().map(|device| device.data).sum()
+    }
+
+    /// Whether the mission makes sense.
+    ///
+    /// # Errors
+    /// The first fault, see [`MissionError`].
+    pub fn check(&self) -> Result<(), MissionError> {
+        self.guard(BatteryUnits(0.0)).map(|_| ())
+    }
+
+    /// The envelope of this mission with `reserve` kept back; checks the mission on the way.
+    ///
+    /// # Errors
+    /// As [`Mission::check`].
+    pub fn guard(&self, reserve: BatteryUnits) -> Result<Guard, MissionError> {
+        if self.fence.grid() != self.grid() {
+            return Err(MissionError::FenceGrid);
+        }
+        let GeoPoint { lat_deg_e7, lon_deg_e7 } = self.corner;
+        if lat_deg_e7.unsigned_abs() > 900_000_000 || lon_deg_e7.unsigned_abs() > 1_800_000_000 {
+            return Err(MissionError::Corner);
+        }
+        if !(self.budget.0.is_finite() && self.budget.0 > 0.0) {
+            return Err(MissionError::Budget);
+        }
+        for (index, &DeviceSite { id, cell, data }) in self.devices.iter().enumerate() {
+            if !self.grid().contains(cell) {
+                return Err(MissionError::DeviceOutside { id });
+            }
+            if self.devices.iter().take(index).any(|other| other.id == id) {
+                return Err(MissionError::DuplicateDevice { id });
+            }
+            if !(data.is_finite() && data >= 0.0) {
+                return Err(MissionError::DeviceData { id });
+            }
+        }
+        Guard::new(&self.fence, self.terminal, reserve).map_err(MissionError::Guard)
+    }
+}

@@ -1,0 +1,188 @@
+//! The states of the pilot, and the reasons that it gives for them.
+
+use serde::{Deserialize, Serialize};
+
+/// What the pilot is doing.
+///
+/// ```text
+///                 self-test failed
+///        Boot ------------------------> Fault (never leaves)
+///          | passed
+///          v       request shadow
+///   +--> Idle <---------------------> Shadow        decides and logs, commands nothing
+///   |      | request engage
+///   |      v
+///   |   Waiting --- GUIDED left again, failsafe ---> Passive
+///   |      | every condition holds
+///   |      v
+///   |   Engaged --- another mode ------------------> Passive --- new request ---> Waiting, Shadow, Idle
+///   |      | a move entered the terminal,     \
+///   |      | return, low battery, failsafe,    \ position lost, autopilot lost,
+///   |      | policy failed, no progress         \ late poll, no progress at all
+///   |      v                                     v
+///   |   Homing -- another mode -> Passive      Fault --- new request ---> Waiting, Shadow, Idle
+///   |      | landing confirmed
+///   |      v
+///   |    Done    landing, then landed
+///   |      |
+///   +------+---- disarmed, request off: from every state but Fault and Boot
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum State {
+    /// The self-test has not been looked at yet.
+    Boot,
+    /// Nothing was asked for.
+    Idle,
+    /// The operator asked to engage; a condition is missing.
+    Waiting,
+    /// The policy flies.
+    Engaged,
+    /// The guard flies to the terminal and lands there.
+    Homing,
+    /// The autopilot lands or has landed at the terminal.
+    Done,
+    /// The human pilot or a failsafe has the aircraft.
+    Passive,
+    /// The pilot gave up; see [`Fault`].
+    Fault,
+    /// Decides and logs, commands nothing.
+    Shadow,
+}
+
+impl State {
+    /// Lower-case English name, as logs and pages print it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            State::Boot => "boot",
+            State::Idle => "idle",
+            State::Waiting => "waiting",
+            State::Engaged => "engaged",
+            State::Homing => "homing",
+            State::Done => "done",
+            State::Passive => "passive",
+            State::Fault => "fault",
+            State::Shadow => "shadow",
+        }
+    }
+}
+
+/// What is still missing before the mission can be engaged, in the order in which it is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Missing {
+    /// No heartbeat of an autopilot for 5 s.
+    Autopilot,
+    /// A failsafe is latched.
+    FailsafeClear,
+    /// The estimator does not trust its position, or says nothing.
+    Estimator,
+    /// No position, or an old one.
+    Position,
+    /// The estimator's origin is unknown.
+    Origin,
+    /// The take-off point is unknown.
+    Home,
+    /// The battery percentage is unknown.
+    Battery,
+    /// The flight altitude does not clear the tallest building.
+    SafeAltitude,
+    /// The motors are not armed.
+    Armed,
+    /// The mode is not GUIDED or OFFBOARD.
+    GuidedMode,
+    /// Not within a few metres of the flight altitude.
+    Altitude,
+    /// Not over the grid and inside the fence, or cut off from the terminal.
+    InsideFence,
+    /// The battery does not cover the way home and the reserve.
+    EnoughBattery,
+}
+
+impl Missing {
+    /// What to say to the operator, at most 40 characters.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Missing::Autopilot => "no autopilot heard",
+            Missing::FailsafeClear => "autopilot failsafe is set",
+            Missing::Estimator => "estimator not healthy",
+            Missing::Position => "no fresh position",
+            Missing::Origin => "no estimator origin",
+            Missing::Home => "no home position",
+            Missing::Battery => "no battery percentage",
+            Missing::SafeAltitude => "GLN_ALT is below the buildings",
+            Missing::Armed => "not armed",
+            Missing::GuidedMode => "mode is not GUIDED/OFFBOARD",
+            Missing::Altitude => "not at GLN_ALT",
+            Missing::InsideFence => "outside the grid or fence",
+            Missing::EnoughBattery => "battery below way home + reserve",
+        }
+    }
+}
+
+/// Why the pilot goes home before the policy says so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ReturnReason {
+    /// A move of the policy entered the terminal: the regular end.
+    Terminal,
+    /// `MAV_CMD_USER_3`.
+    Request,
+    /// The battery no longer covers the way home and the reserve.
+    Battery,
+    /// The autopilot latched a failsafe but stayed in its mode.
+    Failsafe,
+    /// The policy gave no answer, or one that is not a number.
+    Policy,
+    /// 20 s without getting nearer to the target.
+    NoProgress,
+}
+
+impl ReturnReason {
+    /// What to say to the operator, at most 40 characters.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            ReturnReason::Terminal => "terminal reached",
+            ReturnReason::Request => "return requested",
+            ReturnReason::Battery => "battery is low",
+            ReturnReason::Failsafe => "autopilot failsafe",
+            ReturnReason::Policy => "policy failed",
+            ReturnReason::NoProgress => "no progress for 20 s, fence?",
+        }
+    }
+}
+
+/// Why the pilot gave up. All but [`Fault::SelfTest`] end with a new request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Fault {
+    /// The engine does not reproduce the model's golden pairs.
+    SelfTest,
+    /// No heartbeat of the autopilot for 5 s.
+    AutopilotLost,
+    /// No position for 2 s, or the estimator no longer trusts it.
+    PositionLost,
+    /// The program polled too late: the autopilot may already have acted.
+    Late,
+    /// 40 s without getting nearer to any target.
+    NoProgress,
+    /// The autopilot does not confirm the landing.
+    LandingRefused,
+    /// There is no way to the terminal from here.
+    NoWayHome,
+}
+
+impl Fault {
+    /// What to say to the operator, at most 40 characters.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Fault::SelfTest => "self-test failed, will not engage",
+            Fault::AutopilotLost => "autopilot lost for 5 s",
+            Fault::PositionLost => "position lost for 2 s",
+            Fault::Late => "decision loop late",
+            Fault::NoProgress => "no progress for 40 s",
+            Fault::LandingRefused => "landing not confirmed",
+            Fault::NoWayHome => "no way to the terminal",
+        }
+    }
+}
