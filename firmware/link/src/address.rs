@@ -1,0 +1,45 @@
+//! Who speaks and who is spoken to.
+
+/// A MAVLink address. In a target, 0 stands for all systems or all components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Address {
+    /// System id: one vehicle or one ground station.
+    pub system: u8,
+    /// Component id within the system.
+    pub component: u8,
+}
+
+impl Address {
+    /// Everyone.
+    pub const ALL: Address = Address { system: 0, component: 0 };
+
+    /// The address with these ids.
+    #[must_use]
+    pub const fn new(system: u8, component: u8) -> Address {
+        Address { system, component }
+    }
+
+    /// Whether a message to this target is for `own`: broadcast, to our system as a whole, or to us
+    /// (MAVLink guide, "Routing").
+    #[must_use]
+    pub const fn reaches(self, own: Address) -> bool {
+        (self.system == 0 || self.system == own.system)
+            && (self.component == 0 || self.component == own.component)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_reaches_us_by_broadcast_by_system_and_by_name() {
+        let own = Address::new(7, 191);
+        for target in [Address::ALL, Address::new(7, 0), Address::new(7, 191), Address::new(0, 191)] {
+            assert!(target.reaches(own), "{target:?}");
+        }
+        for target in [Address::new(7, 1), Address::new(8, 191), Address::new(8, 0)] {
+            assert!(!target.reaches(own), "{target:?}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! What we say of ourselves.
+
+use super::{Component, NotSent};
+use crate::{Address, Command, CommandResult, Packet, PositionTarget, Priority, SystemState};
+use gleaner_units::Instant;
+use heapless::Vec;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega as dialect;
+use mavlink::dialects::ardupilotmega::{MavAutopilot, MavModeFlag, MavProtocolCapability, MavState, MavType};
+
+impl Component {
+    pub(super) fn poll_heartbeat(&mut self, now: Instant, state: SystemState) {
+        if self.heartbeat_at.is_some_and(|at| now.since(at) < Component::HEARTBEAT_PERIOD) {
+            return;
+        }
+        self.heartbeat_at = Some(now);
+        let packet = Packet::new(&dialect::HEARTBEAT_DATA {
+            custom_mode: 0,
+            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::empty(),
+            system_status: state.into(),
+            mavlink_version: 3,
+        });
+        self.send(Priority::Heartbeat, packet);
+    }
+
+    pub(super) fn send_setpoint(&mut self, now: Instant, target: &PositionTarget) -> Result<(), NotSent> {
+        let autopilot = self.autopilot.address().filter(|_| self.autopilot.is_connected());
+        let packet = target.packet(now, autopilot.ok_or(NotSent::NoAutopilot)?)?;
+        self.send(Priority::Setpoint, packet);
+        Ok(())
+    }
+
+    /// Sends one number as `NAMED_VALUE_FLOAT`; the name is cut to 10 characters. Not a number is not sent.
+    pub fn telemetry(&mut self, now: Instant, name: &str, value: f32) {
+        if value.is_finite() {
+            let data =
+                dialect::NAMED_VALUE_FLOAT_DATA { time_boot_ms: now.as_boot_ms(), value, name: name.into() };
+            self.send(Priority::Bulk, Packet::new(&data));
+        }
+    }
+
+    /// Sends up to 128 bytes to everyone as `TUNNEL`; more are not sent.
+    pub fn tunnel(&mut self, payload_type: u16, payload: &[u8]) {
+        let packet = tunnel_packet(Address::ALL, payload_type, payload);
+        self.send(Priority::Bulk, packet);
+    }
+
+    pub(super) fn send_ack(&mut self, command: &Command, result: CommandResult) {
+        // By hand: the dialect's type cannot hold a command that it does not list.
+        let [command_low, command_high] = command.id.to_le_bytes();
+        let sender = command.sender;
+        let payload =
+            [command_low, command_high, result.to_wire(), 0, 0, 0, 0, 0, sender.system, sender.component];
+        let id = dialect::COMMAND_ACK_DATA::ID;
+        self.send(Priority::Urgent, Packet::from_payload(id, dialect::COMMAND_ACK_DATA::EXTRA_CRC, &payload));
+    }
+
+    pub(super) fn send_timesync(&mut self, now: Instant, asker: Address, asked_ns: i64) {
+        let now_ns = i64::try_from(now.as_micros()).unwrap_or(i64::MAX).saturating_mul(1_000);
+        // 0 would make it a request.
+        let answer = dialect::TIMESYNC_DATA {
+            tc1: now_ns.max(1),
+            ts1: asked_ns,
+            target_system: asker.system,
+            target_component: asker.component,
+        };
+        self.send(Priority::Bulk, Packet::new(&answer));
+    }
+
+    pub(super) fn send_autopilot_version(&mut self) {
+        let version = dialect::AUTOPILOT_VERSION_DATA {
+            capabilities: capabilities(),
+            flight_sw_version: software_version(),
+            ..dialect::AUTOPILOT_VERSION_DATA::DEFAULT
+        };
+        self.send(Priority::Urgent, Packet::new(&version));
+    }
+
+    pub(super) fn send_component_information(&mut self, now: Instant) {
+        let information = dialect::COMPONENT_INFORMATION_BASIC_DATA {
+            capabilities: capabilities(),
+            time_boot_ms: now.as_boot_ms(),
+            vendor_name: "Gleaner".into(),
+            model_name: "Gleaner".into(),
+            software_version: env!("CARGO_PKG_VERSION").into(),
+            ..dialect::COMPONENT_INFORMATION_BASIC_DATA::DEFAULT
+        };
+        self.send(Priority::Urgent, Packet::new(&information));
+    }
+
+    fn send(&mut self, priority: Priority, packet: Option<Packet>) {
+        if let Some(packet) = packet {
+            self.outgoing.push(priority, packet);
+        }
+    }
+}
+
+/// `TUNNEL` by hand: the dialect's type cannot hold a payload type that it does not list.
+fn tunnel_packet(target: Address, payload_type: u16, payload: &[u8]) -> Option<Packet> {
+    const HEADER: usize = 5;
+    let length = u8::try_from(payload.len())
+        .ok()
+        .filter(|&length| usize::from(length) <= crate::event::TUNNEL_BYTES)?;
+    let [type_low, type_high] = payload_type.to_le_bytes();
+    let mut bytes: Vec<u8, { HEADER + crate::event::TUNNEL_BYTES }> =
+        Vec::from_array([type_low, type_high, target.system, target.component, length]);
+    bytes.extend_from_slice(payload).ok()?;
+    Packet::from_payload(dialect::TUNNEL_DATA::ID, dialect::TUNNEL_DATA::EXTRA_CRC, &bytes)
+}
+
+fn capabilities() -> MavProtocolCapability {
+    MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+}
+
+/// The package's version as major, minor, patch and type 255 (`FIRMWARE_VERSION_TYPE_OFFICIAL`), one byte each.
+fn software_version() -> u32 {
+    let mut bytes = [0, 0, 0, 255];
+    for (byte, part) in bytes.iter_mut().zip(env!("CARGO_PKG_VERSION").split('.').take(3)) {
+        *byte = part.parse().unwrap_or(0);
+    }
+    u32::from_be_bytes(bytes)
+}
+
+impl From<SystemState> for MavState {
+    fn from(state: SystemState) -> MavState {
+        match state {
+            SystemState::Uninitialised => MavState::MAV_STATE_UNINIT,
+            SystemState::Boot => MavState::MAV_STATE_BOOT,
+            SystemState::Calibrating => MavState::MAV_STATE_CALIBRATING,
+            SystemState::Standby => MavState::MAV_STATE_STANDBY,
+            SystemState::Active => MavState::MAV_STATE_ACTIVE,
+            SystemState::Critical => MavState::MAV_STATE_CRITICAL,
+            SystemState::Emergency => MavState::MAV_STATE_EMERGENCY,
+            SystemState::PowerOff => MavState::MAV_STATE_POWEROFF,
+            SystemState::FlightTermination => MavState::MAV_STATE_FLIGHT_TERMINATION,
+        }
+    }
+}

@@ -1,0 +1,227 @@
+//! What frames say, in our units.
+
+mod command;
+mod parameter;
+mod vehicle;
+
+pub use command::{Command, CommandAck, CommandForm, CommandResult};
+pub use parameter::{ParameterKey, ParameterName};
+pub use vehicle::{
+    BatteryStatus, ChargeState, GlobalOrigin, GlobalPosition, Heartbeat, HomePosition, LandedState,
+    LocalPosition, RcChannels, SysStatus, SystemState, Velocity,
+};
+
+use crate::fields::Fields;
+use crate::{Address, Frame, TunnelPayload};
+use heapless::Vec;
+use mavlink::dialects::ardupilotmega as dialect;
+use mavlink::{MavlinkVersion, MessageData};
+
+/// Text and its weight, as in `STATUSTEXT`; the order is that of RFC 5424.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+#[expect(missing_docs, reason = "the names are RFC 5424's")]
+pub enum Severity {
+    Emergency = 0,
+    Alert = 1,
+    Critical = 2,
+    Error = 3,
+    Warning = 4,
+    Notice = 5,
+    Info = 6,
+    Debug = 7,
+}
+
+/// One message that this component understands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Message {
+    /// `HEARTBEAT`.
+    Heartbeat(Heartbeat),
+    /// `SYS_STATUS`.
+    SysStatus(SysStatus),
+    /// `BATTERY_STATUS`.
+    BatteryStatus(BatteryStatus),
+    /// `LOCAL_POSITION_NED`.
+    LocalPosition(LocalPosition),
+    /// `GLOBAL_POSITION_INT`.
+    GlobalPosition(GlobalPosition),
+    /// `HOME_POSITION`.
+    HomePosition(HomePosition),
+    /// `GPS_GLOBAL_ORIGIN`.
+    GlobalOrigin(GlobalOrigin),
+    /// `EKF_STATUS_REPORT` flags (ArduPilot).
+    EkfStatus(u16),
+    /// `ESTIMATOR_STATUS` flags (PX4).
+    EstimatorStatus(u16),
+    /// `EXTENDED_SYS_STATE`.
+    LandedState(LandedState),
+    /// `RC_CHANNELS`.
+    RcChannels(RcChannels),
+    /// `COMMAND_LONG` or `COMMAND_INT`.
+    Command(Command),
+    /// `COMMAND_ACK`.
+    CommandAck(CommandAck),
+    /// `PARAM_REQUEST_LIST`.
+    ParameterList {
+        /// Whom it is for.
+        target: Address,
+    },
+    /// `PARAM_REQUEST_READ`.
+    ParameterRead {
+        /// Whom it is for.
+        target: Address,
+        /// Which parameter.
+        key: ParameterKey,
+    },
+    /// `PARAM_SET`; the value is as sent, NaN included.
+    ParameterSet {
+        /// Whom it is for.
+        target: Address,
+        /// Which parameter.
+        name: ParameterName,
+        /// The value asked for.
+        value: f32,
+    },
+    /// `STATUSTEXT`: the severity, and the text of this chunk up to its first NUL (not always UTF-8).
+    StatusText {
+        /// How grave, 0 emergency .. 7 debug.
+        severity: u8,
+        /// The chunk's bytes.
+        text: Vec<u8, 50>,
+    },
+    /// `TIMESYNC` request of someone who wants to compare clocks.
+    TimesyncRequest {
+        /// Whom it is for.
+        target: Address,
+        /// The asker's clock, ns, to be echoed.
+        asked_ns: i64,
+    },
+    /// `TUNNEL`.
+    Tunnel {
+        /// Whom it is for.
+        target: Address,
+        /// Meaning of the payload.
+        payload_type: u16,
+        /// The payload.
+        payload: TunnelPayload,
+    },
+}
+
+/// Why a frame with a good checksum was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MessageFault {
+    /// A field holds a value that the message does not allow.
+    Malformed,
+    /// A coordinate or velocity is NaN or infinite.
+    NotFinite,
+    /// A latitude or longitude that does not exist.
+    NotOnTheGlobe,
+}
+
+fn parse<D: MessageData>(frame: &Frame) -> Result<D, MessageFault> {
+    // Zero extension makes MAVLink 1 frames the same case as truncated ones.
+    D::deser(MavlinkVersion::V2, frame.payload()).map_err(|_| MessageFault::Malformed)
+}
+
+impl Message {
+    /// Reads a frame; `Ok(None)` for a message that this component has no use for.
+    ///
+    /// # Errors
+    /// See [`MessageFault`]. Nothing of a refused message may be used.
+    pub fn decode(frame: &Frame) -> Result<Option<Message>, MessageFault> {
+        let message = match frame.message_id {
+            dialect::HEARTBEAT_DATA::ID => Message::Heartbeat(Heartbeat::read(Fields(frame.payload()))),
+            dialect::SYS_STATUS_DATA::ID => Message::SysStatus(SysStatus::read(Fields(frame.payload()))),
+            dialect::BATTERY_STATUS_DATA::ID => {
+                Message::BatteryStatus(BatteryStatus::read(Fields(frame.payload())))
+            }
+            dialect::LOCAL_POSITION_NED_DATA::ID => Message::LocalPosition(LocalPosition::try_from(
+                parse::<dialect::LOCAL_POSITION_NED_DATA>(frame)?,
+            )?),
+            dialect::GLOBAL_POSITION_INT_DATA::ID => Message::GlobalPosition(GlobalPosition::try_from(
+                parse::<dialect::GLOBAL_POSITION_INT_DATA>(frame)?,
+            )?),
+            dialect::HOME_POSITION_DATA::ID => {
+                Message::HomePosition(HomePosition::try_from(parse::<dialect::HOME_POSITION_DATA>(frame)?)?)
+            }
+            dialect::GPS_GLOBAL_ORIGIN_DATA::ID => {
+                Message::GlobalOrigin(GlobalOrigin::try_from(parse::<dialect::GPS_GLOBAL_ORIGIN_DATA>(
+                    frame,
+                )?)?)
+            }
+            dialect::EKF_STATUS_REPORT_DATA::ID => {
+                Message::EkfStatus(parse::<dialect::EKF_STATUS_REPORT_DATA>(frame)?.flags.bits())
+            }
+            dialect::ESTIMATOR_STATUS_DATA::ID => {
+                Message::EstimatorStatus(parse::<dialect::ESTIMATOR_STATUS_DATA>(frame)?.flags.bits())
+            }
+            dialect::EXTENDED_SYS_STATE_DATA::ID => {
+                Message::LandedState(LandedState::from_wire(Fields(frame.payload()).u8(1)))
+            }
+            dialect::RC_CHANNELS_DATA::ID => Message::RcChannels(RcChannels::read(Fields(frame.payload()))),
+            _ => return Message::decode_conversation(frame),
+        };
+        Ok(Some(message))
+    }
+
+    /// The messages that someone addresses to someone.
+    fn decode_conversation(frame: &Frame) -> Result<Option<Message>, MessageFault> {
+        let fields = Fields(frame.payload());
+        let message = match frame.message_id {
+            dialect::COMMAND_LONG_DATA::ID => Message::Command(Command::read_long(frame.sender, fields)),
+            dialect::COMMAND_INT_DATA::ID => Message::Command(Command::read_int(frame.sender, fields)),
+            dialect::COMMAND_ACK_DATA::ID => Message::CommandAck(CommandAck::read(fields)),
+            dialect::PARAM_REQUEST_LIST_DATA::ID => {
+                Message::ParameterList { target: Address::new(fields.u8(0), fields.u8(1)) }
+            }
+            dialect::PARAM_REQUEST_READ_DATA::ID => parameter::read_request(fields, frame.payload())?,
+            dialect::PARAM_SET_DATA::ID => parameter::read_set(fields, frame.payload())?,
+            dialect::STATUSTEXT_DATA::ID => {
+                let text = frame.payload().get(1..).unwrap_or(&[]);
+                let text = text.iter().copied().take(50).take_while(|&byte| byte != 0).collect();
+                Message::StatusText { severity: fields.u8(0), text }
+            }
+            dialect::TIMESYNC_DATA::ID => {
+                let data = parse::<dialect::TIMESYNC_DATA>(frame)?;
+                if data.tc1 != 0 {
+                    return Ok(None);
+                }
+                let target = Address::new(data.target_system, data.target_component);
+                Message::TimesyncRequest { target, asked_ns: data.ts1 }
+            }
+            dialect::TUNNEL_DATA::ID => read_tunnel(fields, frame.payload())?,
+            _ => return Ok(None),
+        };
+        Ok(Some(message))
+    }
+
+    /// Whom the message is for; [`Address::ALL`] when it names nobody.
+    #[must_use]
+    pub fn target(&self) -> Address {
+        match self {
+            Message::Command(command) => command.target,
+            Message::CommandAck(ack) => ack.target,
+            Message::ParameterList { target }
+            | Message::ParameterRead { target, .. }
+            | Message::ParameterSet { target, .. }
+            | Message::TimesyncRequest { target, .. }
+            | Message::Tunnel { target, .. } => *target,
+            _ => Address::ALL,
+        }
+    }
+}
+
+fn read_tunnel(fields: Fields<'_>, payload: &[u8]) -> Result<Message, MessageFault> {
+    const HEADER: usize = 5;
+    let length = usize::from(fields.u8(4));
+    if length > crate::event::TUNNEL_BYTES {
+        return Err(MessageFault::Malformed);
+    }
+    let sent = payload.get(HEADER..).unwrap_or(&[]);
+    let padded = sent.iter().copied().chain(core::iter::repeat(0)).take(length);
+    Ok(Message::Tunnel {
+        target: Address::new(fields.u8(2), fields.u8(3)),
+        payload_type: fields.u16(0),
+        payload: padded.collect(),
+    })
+}

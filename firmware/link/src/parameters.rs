@@ -1,0 +1,362 @@
+//! The parameters of the product: names, ranges, defaults and values. Ground stations and settings files go
+//! through the same [`Parameters::set`].
+
+use core::fmt;
+use gleaner_units::{BatteryUnits, Duration, Metres, MetresPerSecond};
+
+/// Which parameter; the order is that of the index on the wire and never changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum ParameterId {
+    /// `GLN_W_DATA`.
+    DataWeight = 0,
+    /// `GLN_ENABLE`.
+    Enable = 1,
+    /// `GLN_ALT`.
+    Altitude = 2,
+    /// `GLN_SPEED`.
+    Speed = 3,
+    /// `GLN_RESERVE`.
+    Reserve = 4,
+    /// `GLN_BAT_UNITS`.
+    FullBattery = 5,
+    /// `GLN_ARRIVE_R`.
+    ArriveRadius = 6,
+    /// `GLN_SNR_AGE`.
+    SnrAge = 7,
+    /// `GLN_W_RC`.
+    DataWeightChannel = 8,
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterSpec {
+    /// Which.
+    pub id: ParameterId,
+    /// Name on the wire and in files, at most 16 characters.
+    pub name: &'static str,
+    /// Smallest allowed value.
+    pub min: f32,
+    /// Largest allowed value.
+    pub max: f32,
+    /// Value of a fresh installation.
+    pub default: f32,
+    /// Whether only whole numbers are allowed. All travel as `REAL32`.
+    pub whole: bool,
+    /// Unit, empty for none.
+    pub unit: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+}
+
+const fn row(
+    id: ParameterId,
+    name: &'static str,
+    [min, max, default]: [f32; 3],
+    whole: bool,
+    unit: &'static str,
+    doc: &'static str,
+) -> ParameterSpec {
+    ParameterSpec { id, name, min, max, default, whole, unit, doc }
+}
+
+/// How many parameters there are.
+const COUNT: usize = 9;
+
+/// All parameters, by index: `[min, max, default]`.
+#[rustfmt::skip]
+pub const PARAMETERS: [ParameterSpec; COUNT] = [
+    row(ParameterId::DataWeight, "GLN_W_DATA", [0.0, 1.0, 0.5], false, "",
+        "Preference: weight of data; energy gets 1 minus it. Takes effect at the next decision."),
+    row(ParameterId::Enable, "GLN_ENABLE", [0.0, 2.0, 0.0], true, "",
+        "0 off, 1 engage when the autopilot is in GUIDED or OFFBOARD, 2 shadow."),
+    row(ParameterId::Altitude, "GLN_ALT", [20.0, 120.0, 60.0], false, "m",
+        "Flight altitude above the take-off point."),
+    row(ParameterId::Speed, "GLN_SPEED", [1.0, 20.0, 10.0], false, "m/s",
+        "Horizontal speed asked of the autopilot."),
+    row(ParameterId::Reserve, "GLN_RESERVE", [0.0, 50.0, 2.0], false, "units",
+        "Battery units kept back on top of the way home."),
+    row(ParameterId::FullBattery, "GLN_BAT_UNITS", [1.0, 500.0, 100.0], false, "units",
+        "Battery units that a full battery is worth."),
+    row(ParameterId::ArriveRadius, "GLN_ARRIVE_R", [0.5, 10.0, 2.0], false, "m",
+        "Arrival radius of a cell centre."),
+    row(ParameterId::SnrAge, "GLN_SNR_AGE", [1.0, 600.0, 10.0], false, "s",
+        "Radio reports older than this are masked."),
+    row(ParameterId::DataWeightChannel, "GLN_W_RC", [0.0, 18.0, 0.0], true, "",
+        "RC channel mapped to the preference; 0 none."),
+];
+
+impl ParameterId {
+    /// Its row in the table.
+    #[must_use]
+    pub const fn spec(self) -> ParameterSpec {
+        match self {
+            ParameterId::DataWeight => PARAMETERS[0],
+            ParameterId::Enable => PARAMETERS[1],
+            ParameterId::Altitude => PARAMETERS[2],
+            ParameterId::Speed => PARAMETERS[3],
+            ParameterId::Reserve => PARAMETERS[4],
+            ParameterId::FullBattery => PARAMETERS[5],
+            ParameterId::ArriveRadius => PARAMETERS[6],
+            ParameterId::SnrAge => PARAMETERS[7],
+            ParameterId::DataWeightChannel => PARAMETERS[8],
+        }
+    }
+
+    /// The one with this name; case counts.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<ParameterId> {
+        PARAMETERS.iter().find(|spec| spec.name == name).map(|spec| spec.id)
+    }
+
+    /// The one with this index.
+    #[must_use]
+    pub fn from_index(index: u16) -> Option<ParameterId> {
+        PARAMETERS.get(usize::from(index)).map(|spec| spec.id)
+    }
+
+    /// Its index on the wire.
+    #[must_use]
+    pub const fn index(self) -> u16 {
+        self as u16
+    }
+}
+
+/// `GLN_ENABLE`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Enable {
+    /// Do nothing.
+    Off,
+    /// Engage when the autopilot is in GUIDED or OFFBOARD.
+    Engage,
+    /// Decide and log, command nothing.
+    Shadow,
+}
+
+impl Enable {
+    /// From 0, 1 or 2 exactly.
+    #[must_use]
+    pub fn from_value(value: f32) -> Option<Enable> {
+        [Enable::Off, Enable::Engage, Enable::Shadow].into_iter().find(|enable| enable.value() == value)
+    }
+
+    /// The parameter's value.
+    #[must_use]
+    pub const fn value(self) -> f32 {
+        match self {
+            Enable::Off => 0.0,
+            Enable::Engage => 1.0,
+            Enable::Shadow => 2.0,
+        }
+    }
+}
+
+/// A value that was set, perhaps to what it was before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
+    /// Which.
+    pub id: ParameterId,
+    /// Value before.
+    pub old: f32,
+    /// Value now.
+    pub new: f32,
+}
+
+/// Why a value was not set. The old value stays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ParameterError {
+    /// There is no parameter of that name.
+    Unknown,
+    /// NaN or infinite.
+    NotFinite(ParameterId),
+    /// Outside its range.
+    OutOfRange(ParameterId),
+    /// Not a whole number.
+    NotWhole(ParameterId),
+}
+
+impl fmt::Display for ParameterError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ParameterError::Unknown => write!(f, "no such parameter"),
+            ParameterError::NotFinite(id) => write!(f, "{} must be a number", id.spec().name),
+            ParameterError::OutOfRange(id) => {
+                let spec = id.spec();
+                // Every bound prints exactly in tenths.
+                write!(f, "{} must be {}..{} {}", spec.name, spec.min, spec.max, spec.unit)
+            }
+            ParameterError::NotWhole(id) => write!(f, "{} must be a whole number", id.spec().name),
+        }
+    }
+}
+
+impl core::error::Error for ParameterError {}
+
+/// The values. Always inside their ranges.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameters {
+    values: [f32; COUNT],
+}
+
+impl Default for Parameters {
+    fn default() -> Parameters {
+        Parameters { values: PARAMETERS.map(|spec| spec.default) }
+    }
+}
+
+impl Parameters {
+    /// Sets a value by name: what `PARAM_SET` and settings files do.
+    ///
+    /// # Errors
+    /// See [`ParameterError`]; values are never clamped.
+    pub fn set(&mut self, name: &str, value: f32) -> Result<Change, ParameterError> {
+        let id = ParameterId::from_name(name).ok_or(ParameterError::Unknown)?;
+        self.set_id(id, value)
+    }
+
+    /// [`Parameters::set`] without the search for the name.
+    ///
+    /// # Errors
+    /// As [`Parameters::set`], but never [`ParameterError::Unknown`].
+    pub fn set_id(&mut self, id: ParameterId, value: f32) -> Result<Change, ParameterError> {
+        let spec = id.spec();
+        if !value.is_finite() {
+            return Err(ParameterError::NotFinite(id));
+        }
+        if !(spec.min..=spec.max).contains(&value) {
+            return Err(ParameterError::OutOfRange(id));
+        }
+        if spec.whole && value as i32 as f32 != value {
+            return Err(ParameterError::NotWhole(id));
+        }
+        let old = self.value(id);
+        if let Some(slot) = self.values.get_mut(id as usize) {
+            // Adding zero turns -0 into 0, so equal values have equal bytes on the wire.
+            *slot = value + 0.0;
+        }
+        Ok(Change { id, old, new: self.value(id) })
+    }
+
+    /// One value as it travels.
+    #[must_use]
+    pub fn value(&self, id: ParameterId) -> f32 {
+        self.values.get(id as usize).copied().unwrap_or(id.spec().default)
+    }
+
+    /// Weight of data in the preference, 0..1.
+    #[must_use]
+    pub fn data_weight(&self) -> f32 {
+        self.value(ParameterId::DataWeight)
+    }
+
+    /// Off, engage or shadow.
+    #[must_use]
+    pub fn enable(&self) -> Enable {
+        Enable::from_value(self.value(ParameterId::Enable)).unwrap_or(Enable::Off)
+    }
+
+    /// Flight altitude above the take-off point.
+    #[must_use]
+    pub fn altitude(&self) -> Metres {
+        Metres(self.value(ParameterId::Altitude))
+    }
+
+    /// Horizontal speed to ask for.
+    #[must_use]
+    pub fn speed(&self) -> MetresPerSecond {
+        MetresPerSecond(self.value(ParameterId::Speed))
+    }
+
+    /// Kept back on top of the way home.
+    #[must_use]
+    pub fn reserve(&self) -> BatteryUnits {
+        BatteryUnits(self.value(ParameterId::Reserve))
+    }
+
+    /// What a full battery is worth.
+    #[must_use]
+    pub fn full_battery(&self) -> BatteryUnits {
+        BatteryUnits(self.value(ParameterId::FullBattery))
+    }
+
+    /// Arrival radius of a cell centre.
+    #[must_use]
+    pub fn arrive_radius(&self) -> Metres {
+        Metres(self.value(ParameterId::ArriveRadius))
+    }
+
+    /// Reports older than this are masked.
+    #[must_use]
+    pub fn snr_age(&self) -> Duration {
+        Duration::from_secs_f32(self.value(ParameterId::SnrAge))
+    }
+
+    /// RC channel mapped to the preference, counted from 1.
+    #[must_use]
+    pub fn data_weight_channel(&self) -> Option<u8> {
+        let channel = self.value(ParameterId::DataWeightChannel) as u8;
+        (channel != 0).then_some(channel)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::string::ToString;
+
+    #[test]
+    fn the_table_is_in_order_and_its_defaults_are_allowed() {
+        let mut parameters = Parameters::default();
+        for (index, spec) in PARAMETERS.iter().enumerate() {
+            assert_eq!(spec.id as usize, index);
+            assert_eq!(spec.id.spec(), *spec);
+            assert_eq!(ParameterId::from_index(spec.id.index()), Some(spec.id));
+            assert!(spec.name.len() <= 16 && spec.name.starts_with("GLN_"), "{}", spec.name);
+            for value in [spec.default, spec.min, spec.max] {
+                assert_eq!(
+                    parameters.set(spec.name, value).map(|change| change.new),
+                    Ok(value),
+                    "{}",
+                    spec.name
+                );
+            }
+        }
+        assert_eq!(ParameterId::from_index(9), None);
+    }
+
+    #[test]
+    fn refused_values_change_nothing_and_say_why() {
+        let mut parameters = Parameters::default();
+        let mut refuse = |name: &str, value: f32| {
+            let before = parameters.clone();
+            let error = parameters.set(name, value).unwrap_err();
+            assert_eq!(parameters, before);
+            error.to_string()
+        };
+        assert_eq!(refuse("GLN_W_DATA", f32::NAN), "GLN_W_DATA must be a number");
+        assert_eq!(refuse("GLN_ALT", f32::INFINITY), "GLN_ALT must be a number");
+        assert_eq!(refuse("GLN_ALT", 120.01), "GLN_ALT must be 20..120 m");
+        assert_eq!(refuse("GLN_ARRIVE_R", 0.4), "GLN_ARRIVE_R must be 0.5..10 m");
+        assert_eq!(refuse("GLN_ENABLE", 1.5), "GLN_ENABLE must be a whole number");
+        assert_eq!(refuse("GLN_W_RC", 18.5), "GLN_W_RC must be 0..18 ");
+        assert_eq!(refuse("gln_alt", 60.0), "no such parameter");
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_asked_the_values_stay_inside(asks in proptest::collection::vec((0u16..9, any::<f32>()), 0..40)) {
+            let mut parameters = Parameters::default();
+            for (index, value) in asks {
+                let id = ParameterId::from_index(index).unwrap();
+                let set = parameters.set_id(id, value);
+                let spec = id.spec();
+                let allowed = value >= spec.min && value <= spec.max && (!spec.whole || value.fract() == 0.0);
+                prop_assert_eq!(set.is_ok(), allowed);
+                prop_assert!((spec.min..=spec.max).contains(&parameters.value(id)));
+            }
+            prop_assert!(Enable::from_value(parameters.value(ParameterId::Enable)).is_some());
+            prop_assert!(parameters.data_weight_channel().is_none_or(|channel| (1..=18).contains(&channel)));
+        }
+    }
+}

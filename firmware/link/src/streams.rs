@@ -1,0 +1,150 @@
+//! The messages that we need from the autopilot, asked for until they come.
+//!
+//! ArduPilot sends nothing but heartbeats unless asked; PX4 sends most by itself, some too rarely. The answer to
+//! `MAV_CMD_SET_MESSAGE_INTERVAL` does not name the message, so one is asked for at a time.
+
+use crate::requests::command_packet;
+use crate::{Address, CommandResult, Firmware, Message, Outgoing, Priority};
+use gleaner_units::{Duration, Instant};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega as dialect;
+use mavlink::dialects::ardupilotmega::MavCmd;
+
+struct Stream {
+    message_id: u32,
+    period: Duration,
+    /// The only firmware that has it; `None` for both.
+    only: Option<Firmware>,
+}
+
+const fn stream(message_id: u32, rate_hz: u64, only: Option<Firmware>) -> Stream {
+    Stream { message_id, period: Duration::from_micros(1_000_000 / rate_hz), only }
+}
+
+const COUNT: usize = 9;
+
+/// In the order of need.
+const STREAMS: [Stream; COUNT] = [
+    stream(dialect::LOCAL_POSITION_NED_DATA::ID, 10, None),
+    stream(dialect::EXTENDED_SYS_STATE_DATA::ID, 2, None),
+    stream(dialect::EKF_STATUS_REPORT_DATA::ID, 2, Some(Firmware::ArduPilot)),
+    stream(dialect::ESTIMATOR_STATUS_DATA::ID, 2, Some(Firmware::Px4)),
+    stream(dialect::BATTERY_STATUS_DATA::ID, 2, None),
+    stream(dialect::SYS_STATUS_DATA::ID, 2, None),
+    stream(dialect::HOME_POSITION_DATA::ID, 1, None),
+    stream(dialect::GLOBAL_POSITION_INT_DATA::ID, 2, None),
+    stream(dialect::RC_CHANNELS_DATA::ID, 5, None),
+];
+
+/// Which row of [`STREAMS`] a message belongs to.
+fn row_of(message: &Message) -> Option<usize> {
+    let id = match message {
+        Message::LocalPosition(_) => dialect::LOCAL_POSITION_NED_DATA::ID,
+        Message::LandedState(_) => dialect::EXTENDED_SYS_STATE_DATA::ID,
+        Message::EkfStatus(_) => dialect::EKF_STATUS_REPORT_DATA::ID,
+        Message::EstimatorStatus(_) => dialect::ESTIMATOR_STATUS_DATA::ID,
+        Message::BatteryStatus(_) => dialect::BATTERY_STATUS_DATA::ID,
+        Message::SysStatus(_) => dialect::SYS_STATUS_DATA::ID,
+        Message::HomePosition(_) => dialect::HOME_POSITION_DATA::ID,
+        Message::GlobalPosition(_) => dialect::GLOBAL_POSITION_INT_DATA::ID,
+        Message::RcChannels(_) => dialect::RC_CHANNELS_DATA::ID,
+        _ => return None,
+    };
+    STREAMS.iter().position(|stream| stream.message_id == id)
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Progress {
+    /// An answer to our asking came, whatever it was.
+    answered: bool,
+    seen_at: Option<Instant>,
+    ask_at: Instant,
+}
+
+/// How far the asking has come. A fresh one asks for everything.
+#[derive(Debug, Default)]
+pub(crate) struct Streams {
+    progress: [Progress; COUNT],
+    /// The row asked for and not yet answered, and when.
+    asking: Option<(usize, Instant)>,
+    origin_ask_at: Instant,
+}
+
+impl Streams {
+    /// How long to wait for the answer to one asking.
+    const ANSWER: Duration = Duration::from_secs(1);
+    /// After an accepted one: how long until the message should have come.
+    const ACCEPTED: Duration = Duration::from_secs(5);
+    /// After a refused one.
+    const REFUSED: Duration = Duration::from_secs(30);
+    /// A stream is dead when three periods, and at least this long, pass without it.
+    const DEAD: Duration = Duration::from_secs(3);
+
+    /// A message of the autopilot arrived.
+    pub fn seen(&mut self, now: Instant, message: &Message) {
+        if let Some(progress) = row_of(message).and_then(|row| self.progress.get_mut(row)) {
+            progress.seen_at = Some(now);
+        }
+    }
+
+    /// The autopilot answered a `MAV_CMD_SET_MESSAGE_INTERVAL`.
+    pub fn answered(&mut self, now: Instant, result: CommandResult) {
+        let Some((row, _)) = self.asking.take() else { return };
+        if let Some(progress) = self.progress.get_mut(row) {
+            let accepted = result == CommandResult::Accepted;
+            progress.answered = true;
+            progress.ask_at = now + if accepted { Streams::ACCEPTED } else { Streams::REFUSED };
+        }
+    }
+
+    /// Asks for the next stream that is missing, and for the origin if `needs_origin`.
+    pub fn poll(
+        &mut self,
+        now: Instant,
+        target: Address,
+        firmware: Firmware,
+        needs_origin: bool,
+        out: &mut Outgoing,
+    ) {
+        if needs_origin && now >= self.origin_ask_at {
+            let id = dialect::GPS_GLOBAL_ORIGIN_DATA::ID as f32;
+            send(target, MavCmd::MAV_CMD_REQUEST_MESSAGE, [id, 0.0, 0.0], out);
+            self.origin_ask_at = now + Streams::ACCEPTED;
+        }
+        if self.asking.is_some_and(|(_, since)| now.since(since) < Streams::ANSWER) {
+            return;
+        }
+        let missing = |&(row, stream): &(usize, &Stream)| {
+            stream.only.is_none_or(|only| only == firmware || matches!(firmware, Firmware::Other(_)))
+                && self.progress.get(row).is_some_and(|progress| progress.needs_asking(now, stream))
+        };
+        self.asking = STREAMS.iter().enumerate().find(missing).map(|(row, stream)| {
+            let interval_us = stream.period.as_micros() as f32;
+            send(
+                target,
+                MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL,
+                [stream.message_id as f32, interval_us, 0.0],
+                out,
+            );
+            (row, now)
+        });
+        if let Some(progress) = self.asking.and_then(|(row, _)| self.progress.get_mut(row)) {
+            // Unanswered, the others get their turn first.
+            progress.ask_at = now + Duration::from_secs(2);
+        }
+    }
+}
+
+impl Progress {
+    fn needs_asking(&self, now: Instant, stream: &Stream) -> bool {
+        let dead = Duration::from_micros(3 * stream.period.as_micros()).max(Streams::DEAD);
+        let alive = self.seen_at.is_some_and(|at| now.since(at) < dead);
+        now >= self.ask_at && !(self.answered && alive)
+    }
+}
+
+fn send(target: Address, command: MavCmd, params: [f32; 3], out: &mut Outgoing) {
+    if let Some(packet) = command_packet(target, command, params, 0) {
+        out.push(Priority::Urgent, packet);
+    }
+}

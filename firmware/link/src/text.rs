@@ -1,0 +1,116 @@
+//! Status texts: split, paced, the gravest kept.
+
+use crate::{Outgoing, Packet, Priority, Severity};
+use core::fmt::{self, Write};
+use gleaner_units::{Duration, Instant};
+use heapless::{Deque, String};
+use mavlink::dialects::ardupilotmega::{MavSeverity, STATUSTEXT_DATA};
+
+/// Bytes of one `STATUSTEXT`.
+const CHUNK: usize = 50;
+/// Longest text; the rest is cut off.
+const LONGEST: usize = 3 * CHUNK;
+
+#[derive(Debug)]
+struct Text {
+    severity: Severity,
+    text: String<LONGEST>,
+}
+
+/// Texts that wait for their turn: at most ten chunks a second.
+#[derive(Debug, Default)]
+pub(crate) struct Texts {
+    waiting: Deque<Text, 8>,
+    /// Chunks of the first text that have left.
+    chunks_sent: u8,
+    /// Ties the chunks of one text together; 0 is for texts of one chunk.
+    last_id: u16,
+    next_at: Instant,
+    pub dropped: u32,
+}
+
+/// Writes as much as fits.
+struct Truncated<'a>(&'a mut String<LONGEST>);
+
+impl Write for Truncated<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for character in text.chars() {
+            self.0.push(character).map_err(|_| fmt::Error)?;
+        }
+        Ok(())
+    }
+}
+
+impl Texts {
+    const INTERVAL: Duration = Duration::from_millis(100);
+
+    /// Queues a text. When there is no room, the least grave of the waiting ones goes, or this one.
+    pub fn say(&mut self, severity: Severity, text: fmt::Arguments<'_>) {
+        let mut held = String::new();
+        let _ = Truncated(&mut held).write_fmt(text);
+        if self.waiting.is_full() {
+            self.dropped = self.dropped.saturating_add(1);
+            if !self.make_room(severity) {
+                return;
+            }
+        }
+        let _ = self.waiting.push_back(Text { severity, text: held });
+    }
+
+    /// Drops the newest of the least grave waiting texts if it is less grave than `severity`. Never the first,
+    /// of which a part may have left.
+    fn make_room(&mut self, severity: Severity) -> bool {
+        let least = self.waiting.iter().skip(1).map(|text| text.severity).max();
+        let Some(least) = least.filter(|&least| least > severity) else { return false };
+        let Some(last) = self.waiting.iter().rposition(|text| text.severity == least) else { return false };
+        let mut at = 0;
+        self.waiting.retain(|_| {
+            at += 1;
+            at - 1 != last
+        });
+        true
+    }
+
+    /// Sends the next chunk if it is due and there is room.
+    pub fn poll(&mut self, now: Instant, out: &mut Outgoing) {
+        if now < self.next_at || !out.has_bulk_room() {
+            return;
+        }
+        let Some(first) = self.waiting.front() else { return };
+        let is_long = first.text.len() > CHUNK;
+        if is_long && self.chunks_sent == 0 {
+            self.last_id = self.last_id.checked_add(1).unwrap_or(1);
+        }
+        let id = if is_long { self.last_id } else { 0 };
+        if let Some(packet) = chunk(first, id, self.chunks_sent) {
+            out.push(Priority::Bulk, packet);
+        }
+        self.next_at = now + Texts::INTERVAL;
+        self.chunks_sent += 1;
+        // A chunk that is full to the last byte has no NUL; an empty one more ends the text.
+        let ended = !is_long || usize::from(self.chunks_sent) * CHUNK > first.text.len();
+        if ended {
+            let _ = self.waiting.pop_front();
+            self.chunks_sent = 0;
+        }
+    }
+}
+
+fn chunk(text: &Text, id: u16, chunk_seq: u8) -> Option<Packet> {
+    let mut bytes = [0; CHUNK];
+    let rest = text.text.as_bytes().iter().skip(usize::from(chunk_seq) * CHUNK);
+    for (slot, byte) in bytes.iter_mut().zip(rest) {
+        *slot = *byte;
+    }
+    let severity = match text.severity {
+        Severity::Emergency => MavSeverity::MAV_SEVERITY_EMERGENCY,
+        Severity::Alert => MavSeverity::MAV_SEVERITY_ALERT,
+        Severity::Critical => MavSeverity::MAV_SEVERITY_CRITICAL,
+        Severity::Error => MavSeverity::MAV_SEVERITY_ERROR,
+        Severity::Warning => MavSeverity::MAV_SEVERITY_WARNING,
+        Severity::Notice => MavSeverity::MAV_SEVERITY_NOTICE,
+        Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
+        Severity::Debug => MavSeverity::MAV_SEVERITY_DEBUG,
+    };
+    Packet::new(&STATUSTEXT_DATA { severity, text: bytes.into(), id, chunk_seq })
+}
