@@ -1,0 +1,129 @@
+//! What goes in: samples, and batches packed to the devices that are present.
+
+use super::shape::{DEVICE_FEATURES, DEVICES_MAX, MAP_CELLS, PREFERENCE_FEATURES, UAV_FEATURES};
+
+/// Normalised features of one device.
+pub type DeviceFeatures = [f32; DEVICE_FEATURES];
+
+/// One normalised observation, of a fixed size so that a replay memory may hold it in place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Spare battery, battery, terminal dx, terminal dy; normalised.
+    pub uav: [f32; UAV_FEATURES],
+    /// Weights of data and of energy.
+    pub preference: [f32; PREFERENCE_FEATURES],
+    /// Normalised building heights, south row first.
+    pub local_map: [f32; MAP_CELLS],
+    /// Normalised devices; the first `device_count` are present.
+    pub devices: [DeviceFeatures; DEVICES_MAX],
+    /// How many devices are present, at most [`DEVICES_MAX`].
+    pub device_count: u8,
+}
+
+impl Sample {
+    /// The devices that are present.
+    #[must_use]
+    pub fn devices_present(&self) -> &[DeviceFeatures] {
+        &self.devices[..usize::from(self.device_count)]
+    }
+}
+
+impl Default for Sample {
+    fn default() -> Self {
+        Self {
+            uav: [0.0; UAV_FEATURES],
+            preference: [0.0; PREFERENCE_FEATURES],
+            local_map: [0.0; MAP_CELLS],
+            devices: [[0.0; DEVICE_FEATURES]; DEVICES_MAX],
+            device_count: 0,
+        }
+    }
+}
+
+/// Samples packed one after another, each kind of token in its own matrix.
+///
+/// Keeps its memory across [`Batch::clear`].
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// `[samples, UAV_FEATURES]`.
+    pub(super) uav: Vec<f32>,
+    /// `[samples, PREFERENCE_FEATURES]`.
+    pub(super) preference: Vec<f32>,
+    /// `[samples, MAP_CELLS]`.
+    pub(super) local_map: Vec<f32>,
+    /// `[devices of all samples, DEVICE_FEATURES]`.
+    pub(super) devices: Vec<f32>,
+    /// First device of each sample and, last, the number of all devices: `[samples + 1]`.
+    pub(super) first_device: Vec<usize>,
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            uav: Vec::new(),
+            preference: Vec::new(),
+            local_map: Vec::new(),
+            devices: Vec::new(),
+            first_device: vec![0],
+        }
+    }
+}
+
+impl Batch {
+    /// A batch without samples.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Forgets the samples and keeps the memory.
+    pub fn clear(&mut self) {
+        self.uav.clear();
+        self.preference.clear();
+        self.local_map.clear();
+        self.devices.clear();
+        self.first_device.truncate(1);
+    }
+
+    /// Appends one sample of normalised features; `devices` are those present, in any order.
+    ///
+    /// # Panics
+    /// With more than [`DEVICES_MAX`] devices.
+    pub fn push(
+        &mut self,
+        uav: &[f32; UAV_FEATURES],
+        preference: &[f32; PREFERENCE_FEATURES],
+        local_map: &[f32; MAP_CELLS],
+        devices: &[DeviceFeatures],
+    ) {
+        assert!(devices.len() <= DEVICES_MAX, "{} devices in one sample", devices.len());
+        self.uav.extend_from_slice(uav);
+        self.preference.extend_from_slice(preference);
+        self.local_map.extend_from_slice(local_map);
+        self.devices.extend_from_slice(devices.as_flattened());
+        self.first_device.push(self.devices.len() / DEVICE_FEATURES);
+    }
+
+    /// Appends a sample as it is.
+    pub fn push_sample(&mut self, sample: &Sample) {
+        self.push(&sample.uav, &sample.preference, &sample.local_map, sample.devices_present());
+    }
+
+    /// Samples in the batch.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.first_device.len() - 1
+    }
+
+    /// True without samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Devices present in one sample.
+    #[must_use]
+    pub fn device_count(&self, sample: usize) -> usize {
+        self.first_device[sample + 1] - self.first_device[sample]
+    }
+}

@@ -1,0 +1,285 @@
+//! The sizes of the network, and where each tensor lies in the flat parameter vector.
+
+use rand::{Rng, RngExt};
+
+/// Width of a token and of everything the encoder passes on.
+pub const WIDTH: usize = 64;
+/// Attention heads a layer.
+pub const HEADS: usize = 4;
+/// Width of one head.
+pub const HEAD_WIDTH: usize = WIDTH / HEADS;
+/// Encoder layers.
+pub const LAYERS: usize = 2;
+/// Most devices a sample may hold, the K_max of the observation contract.
+pub const DEVICES_MAX: usize = 12;
+/// Tokens that every sample has: UAV, preference and local map, in this order.
+pub const FIXED_TOKENS: usize = 3;
+/// Tokens of a sample with every device present.
+pub const TOKENS_MAX: usize = FIXED_TOKENS + DEVICES_MAX;
+/// Features of the UAV token.
+pub const UAV_FEATURES: usize = 4;
+/// Features of one device token.
+pub const DEVICE_FEATURES: usize = 5;
+/// Features of the preference token.
+pub const PREFERENCE_FEATURES: usize = 2;
+/// Cells of the local map.
+pub const MAP_CELLS: usize = 100;
+/// What the head reads: UAV, preference, map and the pooled devices.
+pub const HEAD_INPUTS: usize = 4 * WIDTH;
+/// Added to the variance in every layer norm.
+pub const LAYER_NORM_EPSILON: f32 = 1e-5;
+
+/// The sizes that differ between networks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Shape {
+    /// Hidden width of the feed-forward block of each encoder layer.
+    pub feed_forward: usize,
+    /// Hidden width of the head.
+    pub head: usize,
+    /// Outputs: logits of the actor; for a critic, actions x objectives, action-major.
+    pub outputs: usize,
+}
+
+/// One tensor in the flat vector, stored row by row as PyTorch stores it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tensor {
+    /// Dotted name, e.g. `encoder.0.qkv.weight`.
+    pub name: String,
+    /// Index of the first number in the flat vector.
+    pub offset: usize,
+    /// Outputs of a weight matrix; the length of a bias or of a gain.
+    pub rows: usize,
+    /// Inputs of a weight matrix; 1 for a bias or a gain.
+    pub cols: usize,
+}
+
+impl Tensor {
+    /// How many numbers the tensor holds.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows * self.cols
+    }
+
+    /// True for a tensor without numbers; no tensor of a [`Shape`] is.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The tensor's numbers within the flat vector.
+    #[must_use]
+    pub fn of<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
+        &parameters[self.offset..self.offset + self.len()]
+    }
+}
+
+/// Where a linear layer `y = x W^T + b` lies: the weight `[outputs, inputs]`, then the bias.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Linear {
+    pub offset: usize,
+    pub inputs: usize,
+    pub outputs: usize,
+}
+
+impl Linear {
+    pub fn weight<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
+        &parameters[self.offset..self.offset + self.inputs * self.outputs]
+    }
+
+    pub fn bias<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
+        let start = self.offset + self.inputs * self.outputs;
+        &parameters[start..start + self.outputs]
+    }
+
+    /// The weight's and the bias's part of a vector of gradients.
+    pub fn split_mut<'a>(&self, gradients: &'a mut [f32]) -> (&'a mut [f32], &'a mut [f32]) {
+        let weights = self.inputs * self.outputs;
+        gradients[self.offset..self.offset + weights + self.outputs].split_at_mut(weights)
+    }
+}
+
+/// Where a layer norm lies: the gain, then the bias, each `[WIDTH]`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Norm {
+    pub offset: usize,
+}
+
+impl Norm {
+    pub fn gain<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
+        &parameters[self.offset..self.offset + WIDTH]
+    }
+
+    pub fn bias<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
+        &parameters[self.offset + WIDTH..self.offset + 2 * WIDTH]
+    }
+
+    pub fn split_mut<'a>(&self, gradients: &'a mut [f32]) -> (&'a mut [f32], &'a mut [f32]) {
+        gradients[self.offset..self.offset + 2 * WIDTH].split_at_mut(WIDTH)
+    }
+}
+
+/// Where one encoder layer lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EncoderLayout {
+    pub qkv: Linear,
+    pub out: Linear,
+    pub norm1: Norm,
+    pub ff1: Linear,
+    pub ff2: Linear,
+    pub norm2: Norm,
+}
+
+/// Where everything lies, in the order of the flat vector.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    pub project_uav: Linear,
+    pub project_preference: Linear,
+    pub project_map: Linear,
+    pub project_device: Linear,
+    pub encoder: [EncoderLayout; LAYERS],
+    pub head: [Linear; 2],
+    pub len: usize,
+}
+
+impl Layout {
+    pub fn new(shape: Shape) -> Self {
+        let mut len = 0;
+        let mut linear = |inputs, outputs| {
+            let offset = len;
+            len += (inputs + 1) * outputs;
+            Linear { offset, inputs, outputs }
+        };
+        let project_uav = linear(UAV_FEATURES, WIDTH);
+        let project_preference = linear(PREFERENCE_FEATURES, WIDTH);
+        let project_map = linear(MAP_CELLS, WIDTH);
+        let project_device = linear(DEVICE_FEATURES, WIDTH);
+        let encoder = std::array::from_fn(|_| {
+            // A norm is as long as a linear layer with one input: a gain and a bias.
+            let qkv = linear(WIDTH, 3 * WIDTH);
+            let out = linear(WIDTH, WIDTH);
+            let norm1 = Norm { offset: linear(1, WIDTH).offset };
+            let ff1 = linear(WIDTH, shape.feed_forward);
+            let ff2 = linear(shape.feed_forward, WIDTH);
+            let norm2 = Norm { offset: linear(1, WIDTH).offset };
+            EncoderLayout { qkv, out, norm1, ff1, ff2, norm2 }
+        });
+        let head = [linear(HEAD_INPUTS, shape.head), linear(shape.head, shape.outputs)];
+        Self { project_uav, project_preference, project_map, project_device, encoder, head, len }
+    }
+
+    /// The linear layers by name, in the order of the flat vector.
+    fn linears(&self) -> Vec<(String, Linear)> {
+        let mut list = vec![
+            ("project_uav".to_owned(), self.project_uav),
+            ("project_preference".to_owned(), self.project_preference),
+            ("project_map".to_owned(), self.project_map),
+            ("project_device".to_owned(), self.project_device),
+        ];
+        for (index, layer) in self.encoder.iter().enumerate() {
+            list.push((format!("encoder.{index}.qkv"), layer.qkv));
+            list.push((format!("encoder.{index}.out"), layer.out));
+            list.push((format!("encoder.{index}.ff1"), layer.ff1));
+            list.push((format!("encoder.{index}.ff2"), layer.ff2));
+        }
+        for (index, layer) in self.head.iter().enumerate() {
+            list.push((format!("head.{index}"), *layer));
+        }
+        list
+    }
+
+    fn norms(&self) -> Vec<(String, Norm)> {
+        let mut list = Vec::new();
+        for (index, layer) in self.encoder.iter().enumerate() {
+            list.push((format!("encoder.{index}.norm1"), layer.norm1));
+            list.push((format!("encoder.{index}.norm2"), layer.norm2));
+        }
+        list
+    }
+}
+
+impl Shape {
+    /// The actor: five logits, 91,077 parameters.
+    #[must_use]
+    pub const fn actor() -> Self {
+        Self { feed_forward: 128, head: 64, outputs: 5 }
+    }
+
+    /// A critic: five actions x two objectives, index `action * 2 + objective`.
+    #[must_use]
+    pub const fn critic() -> Self {
+        Self { feed_forward: 128, head: 64, outputs: 10 }
+    }
+
+    /// Length of the flat parameter vector.
+    #[must_use]
+    pub fn parameter_count(&self) -> usize {
+        Layout::new(*self).len
+    }
+
+    /// Every tensor in the order of the flat vector, without gaps.
+    #[must_use]
+    pub fn tensors(&self) -> Vec<Tensor> {
+        let layout = Layout::new(*self);
+        let mut tensors = Vec::new();
+        for (name, linear) in layout.linears() {
+            let weights = linear.inputs * linear.outputs;
+            tensors.push(Tensor {
+                name: format!("{name}.weight"),
+                offset: linear.offset,
+                rows: linear.outputs,
+                cols: linear.inputs,
+            });
+            tensors.push(Tensor {
+                name: format!("{name}.bias"),
+                offset: linear.offset + weights,
+                rows: linear.outputs,
+                cols: 1,
+            });
+        }
+        for (name, norm) in layout.norms() {
+            for (part, offset) in [("weight", norm.offset), ("bias", norm.offset + WIDTH)] {
+                tensors.push(Tensor { name: format!("{name}.{part}"), offset, rows: WIDTH, cols: 1 });
+            }
+        }
+        tensors.sort_by_key(|tensor| tensor.offset);
+        tensors
+    }
+
+    /// Fresh parameters as PyTorch draws them by default: weights and biases of a linear layer
+    /// uniform in +-1/sqrt(inputs) (Kaiming uniform with a = sqrt 5), gains 1, norm biases 0.
+    #[must_use]
+    pub fn initialise(&self, rng: &mut impl Rng) -> Vec<f32> {
+        let layout = Layout::new(*self);
+        let mut parameters = vec![0.0; layout.len];
+        for (_, linear) in layout.linears() {
+            let bound = 1.0 / (linear.inputs as f32).sqrt();
+            let (weight, bias) = linear.split_mut(&mut parameters);
+            for value in weight.iter_mut().chain(bias) {
+                *value = bound * (2.0 * rng.random::<f32>() - 1.0);
+            }
+        }
+        for (_, norm) in layout.norms() {
+            norm.split_mut(&mut parameters).0.fill(1.0);
+        }
+        parameters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tensors_tile_the_flat_vector() {
+        for shape in [Shape::actor(), Shape::critic()] {
+            let mut next = 0;
+            for tensor in shape.tensors() {
+                assert_eq!(tensor.offset, next, "{}", tensor.name);
+                next += tensor.len();
+            }
+            assert_eq!(next, shape.parameter_count());
+        }
+        assert_eq!(Shape::actor().parameter_count(), 91_077);
+        assert_eq!(Shape::critic().parameter_count(), 91_402);
+    }
+}
