@@ -1,0 +1,164 @@
+//! The network against PyTorch: outputs, attention, losses, gradients and parameters after three steps of Adam.
+//!
+//! The frozen numbers come from `scripts/pytorch_fixture.py`, which says how to make them anew. Parameters and
+//! inputs are drawn here by the same generator.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use gleaner_host_trainer::net::{Adam, Batch, DEVICE_FEATURES, Shape, TOKENS_MAX, Workspace};
+use gleaner_host_trainer::net::{backward, forward};
+
+#[derive(serde::Deserialize)]
+struct Manifest {
+    seed: String,
+    device_counts: Vec<usize>,
+    steps: usize,
+    learning_rate: f32,
+    stride: usize,
+    sections: BTreeMap<String, (usize, usize)>,
+}
+
+struct Fixture {
+    manifest: Manifest,
+    numbers: Vec<f32>,
+}
+
+impl Fixture {
+    fn read() -> Self {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+        let manifest = std::fs::read_to_string(folder.join("pytorch.json")).unwrap();
+        let bytes = std::fs::read(folder.join("pytorch.f32")).unwrap();
+        let number = |four: &[u8]| f32::from_le_bytes(four.try_into().unwrap());
+        Self {
+            manifest: serde_json::from_str(&manifest).unwrap(),
+            numbers: bytes.chunks_exact(4).map(number).collect(),
+        }
+    }
+
+    fn section(&self, network: &str, name: &str) -> &[f32] {
+        let (start, len) = self.manifest.sections[&format!("{network}.{name}")];
+        &self.numbers[start..start + len]
+    }
+}
+
+/// xorshift64*: uniform in [-1, 1) in steps of 2^-23.
+struct Generator(u64);
+
+impl Generator {
+    fn number(&mut self) -> f32 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        let bits = self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 40;
+        (bits as f64 / f64::from(1 << 23) - 1.0) as f32
+    }
+
+    fn numbers(&mut self, count: usize) -> Vec<f32> {
+        (0..count).map(|_| self.number()).collect()
+    }
+
+    fn parameters(&mut self, shape: Shape) -> Vec<f32> {
+        let mut parameters = Vec::new();
+        let mut inputs = 1.0;
+        for tensor in shape.tensors() {
+            let norm = tensor.name.contains("norm");
+            let gain = norm && tensor.name.ends_with("weight");
+            if tensor.name.ends_with("weight") {
+                inputs = f64::from(tensor.cols as u32).sqrt();
+            }
+            for drawn in self.numbers(tensor.len()).into_iter().map(f64::from) {
+                let value = if norm { drawn * 0.25 + f64::from(u8::from(gain)) } else { drawn / inputs };
+                parameters.push(value as f32);
+            }
+        }
+        parameters
+    }
+
+    fn batch(&mut self, device_counts: &[usize]) -> Batch {
+        let count = device_counts.len();
+        let (uav, preference, local_map) =
+            (self.numbers(count * 4), self.numbers(count * 2), self.numbers(count * 100));
+        let mut batch = Batch::new();
+        for (sample, &present) in device_counts.iter().enumerate() {
+            let devices = self.numbers(present * DEVICE_FEATURES);
+            batch.push(
+                uav[sample * 4..][..4].try_into().unwrap(),
+                preference[sample * 2..][..2].try_into().unwrap(),
+                local_map[sample * 100..][..100].try_into().unwrap(),
+                devices.as_chunks().0,
+            );
+        }
+        batch
+    }
+}
+
+fn assert_close(what: &str, ours: &[f32], torch: &[f32], tolerance: f32) {
+    assert_eq!(ours.len(), torch.len(), "{what}");
+    for (index, (ours, torch)) in ours.iter().zip(torch).enumerate() {
+        assert!((ours - torch).abs() <= tolerance, "{what} {index}: {ours}, PyTorch {torch}");
+    }
+}
+
+/// The biases of the keys: they move all scores of a query alike, so their true gradient is 0 and Adam blows up
+/// whatever rounding leaves of it.
+fn key_biases(shape: Shape) -> Vec<Range<usize>> {
+    let tensors = shape.tensors().into_iter().filter(|tensor| tensor.name.ends_with("qkv.bias"));
+    tensors.map(|tensor| tensor.offset + 64..tensor.offset + 128).collect()
+}
+
+fn agrees_with_pytorch(network: &str, shape: Shape) {
+    let fixture = Fixture::read();
+    let manifest = &fixture.manifest;
+    let mut generator = Generator(manifest.seed.parse().unwrap());
+    let mut parameters = generator.parameters(shape);
+    let batch = generator.batch(&manifest.device_counts);
+    let targets = generator.numbers(batch.len() * shape.outputs);
+    let strided = |all: &[f32]| all.iter().copied().step_by(manifest.stride).collect::<Vec<_>>();
+
+    let mut workspace = Workspace::new();
+    let mut adam = Adam::new(parameters.len(), manifest.learning_rate);
+    let mut losses = Vec::new();
+    for step in 0..manifest.steps {
+        let outputs = forward(&shape, &parameters, &batch, &mut workspace);
+        let scale = 1.0 / outputs.len() as f32;
+        let differences: Vec<f32> = outputs.iter().zip(&targets).map(|(o, t)| o - t).collect();
+        losses.push(scale * differences.iter().map(|d| d * d).sum::<f32>());
+        let d_outputs: Vec<f32> = differences.iter().map(|d| 2.0 * scale * d).collect();
+        let mut gradients = vec![0.0; parameters.len()];
+        if step == 0 {
+            assert_close("outputs", outputs, fixture.section(network, "outputs"), 5e-6);
+            let maps = (0..batch.len()).flat_map(|s| workspace.attention(s).into_iter().flatten());
+            let maps: Vec<f32> = maps.collect();
+            assert_eq!(maps.len(), batch.len() * TOKENS_MAX * TOKENS_MAX);
+            assert_close("attention", &maps, fixture.section(network, "attention"), 1e-6);
+        }
+        backward(&shape, &parameters, &batch, &mut workspace, &d_outputs, &mut gradients);
+        if step == 0 {
+            let square = |g: &f32| f64::from(*g).powi(2);
+            let norm = |part: &[f32]| part.iter().map(square).sum::<f64>().sqrt() as f32;
+            let norms: Vec<f32> = shape.tensors().iter().map(|t| norm(t.of(&gradients))).collect();
+            assert_close("norms", &norms, fixture.section(network, "gradient_norms"), 2e-6);
+            assert_close("gradients", &strided(&gradients), fixture.section(network, "gradients"), 5e-7);
+        }
+        adam.step(&mut parameters, &gradients);
+    }
+    assert_close("losses", &losses, fixture.section(network, "losses"), 1e-6);
+    let mut after = strided(&parameters);
+    let torch = fixture.section(network, "parameters_after");
+    for index in key_biases(shape).into_iter().flatten().filter(|i| i % manifest.stride == 0) {
+        after[index / manifest.stride] = torch[index / manifest.stride];
+    }
+    assert_close("parameters after", &after, torch, 2e-5);
+}
+
+#[test]
+fn actor_agrees_with_pytorch() {
+    agrees_with_pytorch("actor", Shape::actor());
+}
+
+#[test]
+fn critic_agrees_with_pytorch() {
+    agrees_with_pytorch("critic", Shape::critic());
+}
