@@ -37,17 +37,28 @@
 )]
 
 mod decision;
+mod deliberation;
+mod engagement;
+mod flight;
+mod ledger;
+mod leg;
 mod machine;
 mod mission;
+#[cfg(feature = "std")]
+pub mod mission_file;
 mod onboard;
-mod parameters;
+mod rc;
+mod standby;
 mod state;
+mod stream;
 mod vehicle;
 
 pub use decision::{Decision, DecisionRecord, RECORD_BYTES_MAX};
-pub use machine::{Command, Inputs, Machine, Notice, Outputs, Request, Severity, Telemetry};
+pub use machine::{Inputs, Machine, Notice, Outputs, Request, Telemetry};
 pub use mission::{DeviceSite, MAX_DEVICES, Mission, MissionError};
-pub use onboard::{Onboard, Settings, Stats};
-pub use parameters::{Enable, PARAMETERS, ParameterError, ParameterSpec, Parameters};
+pub use onboard::{Onboard, OnboardError, Settings, Stats};
 pub use state::{Fault, Missing, ReturnReason, State};
-pub use vehicle::{Autopilot, Mode, Vehicle};
+pub use vehicle::Vehicle;
+
+// The link owns these nouns; they are part of the pilot's interface.
+pub use gleaner_link::{AutopilotCommand, Enable, ParameterError, ParameterId, Parameters, Severity};

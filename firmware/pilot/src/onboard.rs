@@ -1,13 +1,24 @@
 //! Bytes in, bytes out: link endpoint, radio decoder, device table and [`Machine`] in one.
 
-use crate::{Decision, Fault, Machine, Mission, MissionError, Parameters, State};
-use gleaner_policy::{Policy, SelfTestError};
+use crate::rc::Knob;
+use crate::{
+    Decision, Fault, Inputs, MAX_DEVICES, Machine, Missing, Mission, MissionError, Outputs, RECORD_BYTES_MAX,
+    Request, ReturnReason, State, Vehicle,
+};
+use core::fmt;
+use gleaner_link::{
+    AutopilotCommand, Component, Enable, Event, LinkStats, OperatorRequest, Outcome, ParameterId, Parameters,
+    PositionTarget, SettingsError, Status, TUNNEL_DECISION,
+};
+use gleaner_policy::{DeviceState, Policy, SelfTestError};
+use gleaner_radio::{DeviceTable, ReportDecoder, ReportStats, decode_body};
 use gleaner_units::{BatteryUnits, Cell, Duration, Instant};
+use heapless::Vec;
 
 /// Who we are on the link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// MAVLink system id; `None` adopts the autopilot's.
+    /// MAVLink system id when no vehicle's can be adopted; `None` is 1.
     pub system_id: Option<u8>,
     /// MAVLink component id, 191 unless something else on the vehicle has it.
     pub component_id: u8,
@@ -19,32 +30,89 @@ impl Default for Settings {
     }
 }
 
+/// Why there can be no pilot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OnboardError {
+    /// The mission cannot be flown.
+    Mission(MissionError),
+    /// The ids are impossible.
+    Settings(SettingsError),
+}
+
+impl fmt::Display for OnboardError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            OnboardError::Mission(error) => write!(f, "mission: {error}"),
+            OnboardError::Settings(error) => write!(f, "settings: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for OnboardError {}
+
+impl From<MissionError> for OnboardError {
+    fn from(error: MissionError) -> OnboardError {
+        OnboardError::Mission(error)
+    }
+}
+
+impl From<SettingsError> for OnboardError {
+    fn from(error: SettingsError) -> OnboardError {
+        OnboardError::Settings(error)
+    }
+}
+
 /// Numbers for a summary or a page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stats {
-    /// Decisions since boot, of policy and guard.
+    /// Decisions since boot, of policy, guard and shadow.
     pub decisions: u32,
     /// Battery units paid since the mission was engaged (0.5 a hover, 1 a move).
     pub spent: BatteryUnits,
-    /// Battery units left, by the ledger; `None` before the first engagement.
-    pub battery: Option<BatteryUnits>,
     /// Fraction of the initial data that is known to be collected.
     pub collected: f32,
+    /// Changes of the preference since boot.
+    pub preference_changes: u32,
     /// The cell that the current leg leads to.
     pub target: Option<Cell>,
+    /// What is missing before the mission can be engaged.
+    pub missing: Option<Missing>,
+    /// Why the pilot flies home.
+    pub return_reason: Option<ReturnReason>,
     /// Why the pilot gave up.
     pub fault: Option<Fault>,
     /// Whether the aircraft has landed at the end of a mission.
     pub landed: bool,
+    /// Counters of the link.
+    pub link: LinkStats,
+    /// Counters of the radio's serial port.
+    pub radio: ReportStats,
+    /// Reports that came by `TUNNEL` and were no reports.
+    pub tunnel_refused: u32,
+    /// Reports of devices that are not of this mission.
+    pub unknown_reports: u32,
+}
+
+/// What the link told since the last poll.
+#[derive(Default)]
+struct Told {
+    request: Option<Request>,
+    other_mode_seen: bool,
+    ended: Vec<(AutopilotCommand, bool), 8>,
 }
 
 /// The whole pilot. Feed it bytes, poll it at 20 Hz or more, carry its bytes away.
 pub struct Onboard<P> {
     machine: Machine,
     policy: P,
+    link: Component,
+    radio: ReportDecoder,
+    devices: DeviceTable<MAX_DEVICES>,
+    knob: (Option<u8>, Knob),
+    refused: Vec<(AutopilotCommand, bool), 2>,
+    tunnel_refused: u32,
     inference_time: Option<Duration>,
-    parameters: Parameters,
-    settings: Settings,
+    decision_taken: bool,
 }
 
 impl<P: Policy> Onboard<P> {
@@ -53,42 +121,77 @@ impl<P: Policy> Onboard<P> {
     /// request in this run engages.
     ///
     /// # Errors
-    /// The mission cannot be flown.
+    /// See [`OnboardError`].
     pub fn new(
         mission: Mission,
-        parameters: Parameters,
+        mut parameters: Parameters,
         settings: Settings,
         policy: P,
         self_test: Result<(), SelfTestError>,
-    ) -> Result<Onboard<P>, MissionError> {
+    ) -> Result<Onboard<P>, OnboardError> {
+        // 0 is in the parameter's range.
+        let _ = parameters.set_id(ParameterId::Enable, Enable::Off.value());
+        let settings = gleaner_link::Settings::new(settings.system_id.unwrap_or(1), settings.component_id)?;
+        let ids: Vec<u16, MAX_DEVICES> = mission.devices.iter().map(|site| site.id).collect();
         let machine = Machine::new(mission, self_test.is_ok())?;
-        Ok(Onboard { machine, policy, inference_time: None, parameters, settings })
+        // The mission's check has found doubles already, and the capacities are the same.
+        let devices = DeviceTable::new(&ids).map_err(|_| MissionError::DuplicateDevice { id: 0 })?;
+        Ok(Onboard {
+            machine,
+            policy,
+            link: Component::new(settings, parameters),
+            radio: ReportDecoder::new(),
+            devices,
+            knob: (None, Knob::default()),
+            refused: Vec::new(),
+            tunnel_refused: 0,
+            inference_time: None,
+            decision_taken: true,
+        })
     }
 
     /// Bytes from the autopilot's link (which also carries the ground station), in any pieces.
     pub fn receive_link(&mut self, now: Instant, bytes: &[u8]) {
-        let _ = (now, bytes, &self.settings);
+        self.link.receive(now, bytes);
     }
 
     /// Bytes from the radio: postcard reports in COBS, in any pieces.
     pub fn receive_radio(&mut self, now: Instant, bytes: &[u8]) {
-        let _ = (now, bytes);
+        let devices = &mut self.devices;
+        self.radio.push(bytes, |report| {
+            devices.apply(now, &report);
+        });
     }
 
     /// One step: decides what to send. The model runs inside. Call at 20 Hz or more; the clock must not go back.
+    /// Heartbeat and targets leave from here only: when the calls stop, they stop.
     pub fn poll(&mut self, now: Instant) {
-        let _ = (now, &mut self.policy, &self.parameters);
+        let told = self.take_events(now);
+        self.follow_knob(now);
+        let vehicle = Vehicle::observe(now, self.link.autopilot());
+        let devices = self.device_states(now);
+        let inputs = Inputs {
+            vehicle: &vehicle,
+            devices: &devices,
+            parameters: self.link.parameters(),
+            request: told.request,
+            other_mode_seen: told.other_mode_seen,
+            ended: &told.ended,
+        };
+        let out = self.machine.poll(now, &inputs, &mut self.policy);
+        self.send(now, &out);
+        let state = self.machine.system_state();
+        self.link.poll(now, &Status { state, may_engage: self.machine.may_engage() });
     }
 
     /// Moves bytes for the link into `buffer`; how many. Call until it gives 0.
     pub fn transmit(&mut self, buffer: &mut [u8]) -> usize {
-        let _ = buffer;
-        0
+        self.link.transmit(buffer)
     }
 
     /// The last decision, once.
     pub fn decision(&mut self) -> Option<&Decision> {
-        self.machine.decision()
+        if core::mem::replace(&mut self.decision_taken, true) { None } else { self.machine.decision() }
     }
 
     /// What the pilot is doing.
@@ -97,27 +200,47 @@ impl<P: Policy> Onboard<P> {
         self.machine.state()
     }
 
+    /// The mission machine, to look at.
+    #[must_use]
+    pub const fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// The MAVLink endpoint, to look at.
+    #[must_use]
+    pub const fn link(&self) -> &Component {
+        &self.link
+    }
+
     /// The numbers so far.
     #[must_use]
     pub fn stats(&self) -> Stats {
+        let machine = &self.machine;
         Stats {
-            decisions: 0,
-            spent: BatteryUnits(0.0),
-            battery: None,
-            collected: 0.0,
-            target: None,
-            fault: None,
-            landed: false,
+            decisions: machine.decisions(),
+            spent: machine.spent(),
+            collected: machine.collected(),
+            preference_changes: machine.preference_changes(),
+            target: machine.target(),
+            missing: machine.missing(),
+            return_reason: machine.return_reason(),
+            fault: machine.fault(),
+            landed: machine.landed(),
+            link: self.link.stats(),
+            radio: self.radio.stats(),
+            tunnel_refused: self.tunnel_refused,
+            unknown_reports: self.devices.unknown_reports(),
         }
     }
 
     /// The parameters as they are now.
     #[must_use]
     pub const fn parameters(&self) -> &Parameters {
-        &self.parameters
+        self.link.parameters()
     }
 
     /// The engine, for a program that times it.
+    #[must_use]
     pub const fn policy(&self) -> &P {
         &self.policy
     }
@@ -125,5 +248,114 @@ impl<P: Policy> Onboard<P> {
     /// How long the last inference took, measured by the program (a clock is an input); sent as `infer_us`.
     pub fn set_inference_time(&mut self, took: Duration) {
         self.inference_time = Some(took);
+    }
+
+    fn take_events(&mut self, now: Instant) -> Told {
+        let mut told = Told::default();
+        told.ended.extend(self.refused.iter().copied());
+        self.refused.clear();
+        while let Some(event) = self.link.next_event() {
+            match event {
+                Event::Operator(OperatorRequest::Enable(enable)) => {
+                    told.request = Some(match enable {
+                        Enable::Off => Request::Off,
+                        Enable::Engage => Request::Engage,
+                        Enable::Shadow => Request::Shadow,
+                    });
+                }
+                Event::Operator(OperatorRequest::ReturnNow) => told.request = Some(Request::Return),
+                Event::ModeChanged(mode) => told.other_mode_seen |= !mode.companion_may_steer(),
+                Event::RequestEnded { outcome: Outcome::Superseded, .. } => {}
+                Event::RequestEnded { command, outcome } => {
+                    // At most two commands are under way, each ends once.
+                    let _ = told.ended.push((command, outcome == Outcome::Accepted));
+                }
+                Event::RadioReport(payload) => match decode_body(&payload) {
+                    Ok(report) => {
+                        self.devices.apply(now, &report);
+                    }
+                    Err(_) => self.tunnel_refused = self.tunnel_refused.saturating_add(1),
+                },
+                // The snapshot and the parameters tell the rest.
+                Event::Operator(OperatorRequest::SetPreference(_))
+                | Event::Parameter(_)
+                | Event::AutopilotConnected
+                | Event::AutopilotLost
+                | Event::AutopilotRebooted
+                | Event::ArmedChanged(_)
+                | Event::FailsafeBegan(_) => {}
+            }
+        }
+        told
+    }
+
+    /// The knob writes the parameter, so that every ground station sees what holds.
+    fn follow_knob(&mut self, now: Instant) {
+        let channel = self.link.parameters().data_weight_channel();
+        if self.knob.0 != channel {
+            self.knob = (channel, Knob::default());
+        }
+        let Some(channel) = channel else { return };
+        let pulse_us = self.link.autopilot().rc_pulse_us(now, channel);
+        if let Some(weight) = self.knob.1.turned(pulse_us) {
+            // The knob's range is the parameter's.
+            let _ = self.link.set_parameter(ParameterId::DataWeight, weight);
+        }
+    }
+
+    fn device_states(&self, now: Instant) -> Vec<DeviceState, MAX_DEVICES> {
+        let max_age = self.link.parameters().snr_age();
+        let state = |(index, site): (usize, &crate::DeviceSite)| DeviceState {
+            cell: site.cell,
+            remaining: self.devices.remaining(index).unwrap_or(site.data),
+            snr: self.devices.snr(index, now, max_age),
+        };
+        self.machine.mission().devices.iter().enumerate().map(state).collect()
+    }
+
+    fn send(&mut self, now: Instant, out: &Outputs) {
+        if out.withdraw {
+            self.link.stop_steering();
+            self.link.withdraw_requests();
+        }
+        if let Some(position) = out.setpoint {
+            // Not sent without an autopilot; its loss is in the next snapshot.
+            let _ = self.link.steer(now, &PositionTarget::at(position));
+        }
+        if let Some(command) = out.command
+            && self.link.request(now, command).is_err()
+        {
+            let _ = self.refused.push((command, false));
+        }
+        for notice in &out.notices {
+            self.link.say(notice.severity, format_args!("{}", notice.text));
+        }
+        if out.decided
+            && let Some(decision) = self.machine.decision()
+        {
+            self.decision_taken = false;
+            let mut buffer = [0; RECORD_BYTES_MAX];
+            if let Some(bytes) = decision.record().encode(&mut buffer) {
+                self.link.tunnel(TUNNEL_DECISION, bytes);
+            }
+        }
+        self.send_telemetry(now, out);
+    }
+
+    fn send_telemetry(&mut self, now: Instant, out: &Outputs) {
+        let Some(telemetry) = out.telemetry else { return };
+        let infer_us = self.inference_time.map(|took| took.as_micros() as f32);
+        let values = [
+            ("w_data", Some(telemetry.w_data)),
+            ("collected", Some(telemetry.collected)),
+            ("spare_bat", telemetry.spare.map(|spare| spare.0)),
+            ("infer_us", infer_us),
+            ("attn_dev", telemetry.attended.map(f32::from)),
+        ];
+        for (name, value) in values {
+            if let Some(value) = value {
+                self.link.telemetry(now, name, value);
+            }
+        }
     }
 }

@@ -65,6 +65,13 @@ impl State {
             State::Shadow => "shadow",
         }
     }
+
+    /// Whether targets or commands of ours may be under way in this state. (A fault may still ask the autopilot
+    /// to return, see [`Fault`].)
+    #[must_use]
+    pub const fn commands(self) -> bool {
+        matches!(self, State::Waiting | State::Engaged | State::Homing)
+    }
 }
 
 /// What is still missing before the mission can be engaged, in the order in which it is asked for.
@@ -152,7 +159,8 @@ impl ReturnReason {
     }
 }
 
-/// Why the pilot gave up. All but [`Fault::SelfTest`] end with a new request.
+/// Why the pilot gave up. Targets stop. After a fault in flight the autopilot is asked once to return to launch,
+/// while it is still in our mode. All but [`Fault::SelfTest`] end with a new request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Fault {
     /// The engine does not reproduce the model's golden pairs.

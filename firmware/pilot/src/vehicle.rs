@@ -1,61 +1,75 @@
-//! What the autopilot says, in our words. Wire scaling is undone before it gets here.
+//! What the machine must know of the autopilot, with ages already applied.
 
-use gleaner_units::{BatteryUnits, GeoPoint, Instant, Ned};
+use gleaner_link::{Autopilot, Firmware, FlightMode, LandedState};
+use gleaner_units::{Duration, GeoPoint, Instant, Ned};
 
-/// Whose rules apply.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Autopilot {
-    /// ArduCopter: position targets are remembered for ever.
-    ArduPilot,
-    /// PX4: position targets must stream, also before OFFBOARD.
-    Px4,
-}
+/// Positions come at 10 Hz; two seconds without one are no jitter of the link.
+const POSITION_AGE: Duration = Duration::from_secs(2);
+/// PX4 sends its battery every two seconds unasked; a charge does not change much in ten.
+const BATTERY_AGE: Duration = Duration::from_secs(10);
 
-/// The flight mode, as far as the pilot must tell them apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// GUIDED or OFFBOARD: the autopilot follows our targets.
-    Guided,
-    /// The autopilot lands.
-    Land,
-    /// The autopilot returns to its home.
-    Return,
-    /// Anything else: the human pilot has the aircraft.
-    Other,
-}
-
-/// The latest of everything the autopilot said. A value with an [`Instant`] ages; the others hold until told
-/// otherwise. Absent is `None`.
+/// A snapshot of the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Vehicle {
-    /// From the heartbeat.
-    pub autopilot: Option<Autopilot>,
-    /// When the last heartbeat came.
-    pub heard: Option<Instant>,
-    /// Flight mode of the last heartbeat.
-    pub mode: Option<Mode>,
-    /// Whether the motors are armed.
+    /// Whose rules apply; `None` before the first heartbeat.
+    pub firmware: Option<Firmware>,
+    /// Mode of the last heartbeat; `None` when none came for five seconds.
+    pub mode: Option<FlightMode>,
+    /// Whether the motors are armed, as of the last heartbeat.
     pub armed: bool,
-    /// Whether any failsafe is latched (`system_status` critical or worse, or battery `charge_state` low or worse).
+    /// Whether any failsafe is latched.
     pub failsafe: bool,
     /// Whether the autopilot says that it stands on the ground.
-    pub landed: Option<bool>,
-    /// Position in the estimator's frame.
-    pub position: Option<(Instant, Ned)>,
-    /// Whether the estimator trusts its position.
-    pub estimator_healthy: Option<(Instant, bool)>,
-    /// The estimator's origin.
+    pub on_ground: bool,
+    /// Whether the estimator trusts itself, the position is fresh (1 s) and the origin is known.
+    pub ready: bool,
+    /// Position in the estimator's frame, if told within two seconds.
+    pub position: Option<Ned>,
+    /// Where the estimator's origin is.
     pub origin: Option<GeoPoint>,
-    /// Home (the take-off point) in the estimator's frame.
-    pub home: Option<Ned>,
+    /// Home below the estimator's origin, m.
+    pub home_down_m: Option<f32>,
     /// Battery left, whole percent, truncated.
-    pub battery_percent: Option<(Instant, u8)>,
+    pub battery_percent: Option<u8>,
 }
 
 impl Vehicle {
-    /// Battery units that the autopilot's percentage certainly still holds, `percent / 100 * full`.
+    /// The snapshot at `now`.
     #[must_use]
-    pub fn battery(&self, full: BatteryUnits) -> Option<BatteryUnits> {
-        self.battery_percent.map(|(_, percent)| full * (f32::from(percent.min(100)) / 100.0))
+    pub fn observe(now: Instant, autopilot: &Autopilot) -> Vehicle {
+        let origin = autopilot.origin();
+        Vehicle {
+            firmware: autopilot.firmware(),
+            mode: autopilot.mode(),
+            armed: autopilot.is_armed(),
+            failsafe: autopilot.failsafe().is_some(),
+            on_ground: autopilot.landed() == LandedState::OnGround,
+            ready: autopilot.is_ready(now),
+            position: autopilot.position(now, POSITION_AGE).map(|told| told.position),
+            origin: origin.map(|origin| origin.point),
+            // From the two altitudes: ArduPilot fills HOME_POSITION's local fields with zeros.
+            home_down_m: origin.zip(autopilot.home()).map(|(origin, home)| {
+                (f64::from(origin.altitude_amsl_mm) - f64::from(home.altitude_amsl_mm)) as f32 * 1e-3
+            }),
+            battery_percent: autopilot.battery_percent(now, BATTERY_AGE),
+        }
+    }
+
+    /// Whether the autopilot is heard and follows our targets.
+    #[must_use]
+    pub fn is_guided(&self) -> bool {
+        self.mode.is_some_and(FlightMode::companion_may_steer)
+    }
+
+    /// Whether the autopilot is heard and lands or returns by itself.
+    #[must_use]
+    pub const fn is_landing_or_returning(&self) -> bool {
+        matches!(self.mode, Some(FlightMode::Land | FlightMode::Return))
+    }
+
+    /// Whether a heartbeat shows a mode in which someone else has the aircraft. Silence shows nothing.
+    #[must_use]
+    pub fn is_taken(&self) -> bool {
+        self.mode.is_some_and(|mode| !mode.companion_may_steer())
     }
 }

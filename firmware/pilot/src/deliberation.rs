@@ -1,0 +1,80 @@
+//! How a decision is made: by the policy inside the guard's mask, or by the guard alone.
+
+use crate::{Decision, Mission, ReturnReason, State};
+use gleaner_guard::Guard;
+use gleaner_policy::{DeviceState, Policy, Preference, Situation, Tokens};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Instant};
+
+/// What a decision starts from.
+#[derive(Clone, Copy)]
+pub(crate) struct Deliberation<'a> {
+    pub(crate) mission: &'a Mission,
+    pub(crate) guard: &'a Guard,
+    pub(crate) devices: &'a [DeviceState],
+    pub(crate) preference: Preference,
+    pub(crate) collected: f32,
+    pub(crate) sequence: u32,
+    pub(crate) now: Instant,
+    pub(crate) state: State,
+    pub(crate) cell: Cell,
+    pub(crate) battery: BatteryUnits,
+}
+
+impl Deliberation<'_> {
+    /// The policy's best action among those that the guard allows.
+    ///
+    /// # Errors
+    /// [`ReturnReason::Policy`]: the engine failed, or a logit is not a finite number. A model that answers
+    /// nonsense for one action is not believed for the others.
+    ///
+    /// # Cost
+    /// One inference.
+    pub(crate) fn by_policy<P: Policy>(&self, policy: &mut P) -> Result<Decision, ReturnReason> {
+        let mask = self.guard.mask(self.cell, self.battery);
+        // Never chosen unless the policy answers: the action below replaces it.
+        let mut decision = self.draft(Action::Hover, mask);
+        let inference = policy.infer(&decision.tokens).map_err(|_| ReturnReason::Policy)?;
+        if !inference.logits.iter().all(|logit| logit.is_finite()) {
+            return Err(ReturnReason::Policy);
+        }
+        decision.action = mask.argmax(&inference.logits).ok_or(ReturnReason::Policy)?;
+        decision.attended = inference.attention.most_attended(&decision.slots);
+        decision.inference = Some(inference);
+        Ok(decision)
+    }
+
+    /// The first move of the shortest way to the terminal; `None` on the terminal and where there is no way.
+    pub(crate) fn homeward(&self) -> Option<Decision> {
+        let action = self.guard.homeward(self.cell)?;
+        Some(self.draft(action, ActionMask::EMPTY.with(action)))
+    }
+
+    fn draft(&self, action: Action, mask: ActionMask) -> Decision {
+        let spare = self.guard.spare(self.cell, self.battery).unwrap_or_default();
+        let situation = Situation {
+            cell: self.cell,
+            battery: self.battery,
+            spare,
+            terminal: self.mission.terminal,
+            preference: self.preference,
+            heights: &self.mission.heights,
+        };
+        let (tokens, slots) = Tokens::build(&situation, self.devices.iter().copied());
+        Decision {
+            sequence: self.sequence,
+            time: self.now,
+            state: self.state,
+            cell: self.cell,
+            action,
+            mask,
+            battery: self.battery,
+            spare,
+            preference: self.preference,
+            tokens,
+            slots,
+            inference: None,
+            attended: None,
+            collected: self.collected,
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! One leg: the flight to a cell centre, or the hover over it.
+
+use gleaner_units::{Cell, Duration, Instant, Metres, Ned};
+
+/// How long a leg may bring no progress. Long against a gust (a cell takes about 5 s), short against a battery.
+pub(crate) const STALL: Duration = Duration::from_secs(20);
+
+/// Coming nearer by less is noise of the position.
+const PROGRESS_M: f32 = 0.5;
+
+/// Why this leg is flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// To the centre of the cell under the aircraft; paid for by nobody.
+    Centre,
+    /// Over the same cell for one slot.
+    Hover,
+    /// To a neighbouring cell.
+    Move,
+}
+
+/// A target and how far the aircraft is with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Leg {
+    pub(crate) cell: Cell,
+    /// The cell that the leg began in.
+    pub(crate) from: Cell,
+    pub(crate) target: Ned,
+    pub(crate) purpose: Purpose,
+    not_before: Instant,
+    nearest_m: f32,
+    progress_at: Instant,
+}
+
+/// How a leg is going.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Progress {
+    /// On the way, or the slot is not over.
+    Underway,
+    /// Inside the arrival radius, and the slot is over.
+    Arrived,
+    /// [`STALL`] without coming nearer; told once, then the time starts anew.
+    Stalled,
+}
+
+impl Leg {
+    pub(crate) fn new(now: Instant, purpose: Purpose, from: Cell, cell: Cell, target: Ned) -> Leg {
+        Leg { cell, from, target, purpose, not_before: now, nearest_m: f32::INFINITY, progress_at: now }
+    }
+
+    /// The same leg, not over before `slot` has passed.
+    pub(crate) fn lasting(self, slot: Duration) -> Leg {
+        Leg { not_before: self.not_before + slot, ..self }
+    }
+
+    /// Does not wait for the slot any longer.
+    pub(crate) fn hurry(&mut self) {
+        self.not_before = Instant::ZERO;
+    }
+
+    /// Neither autopilot says "reached" for a position target, so arrival is ours to see; and a target outside
+    /// the autopilot's own fence is dropped without a word, so is the lack of progress.
+    pub(crate) fn watch(&mut self, now: Instant, position: &Ned, radius: Metres) -> Progress {
+        let distance_m = position.horizontal_distance(&self.target).0;
+        if distance_m < radius.0 {
+            self.progress_at = now;
+            self.nearest_m = f32::INFINITY;
+            return if now >= self.not_before { Progress::Arrived } else { Progress::Underway };
+        }
+        if distance_m < self.nearest_m - PROGRESS_M {
+            self.nearest_m = distance_m;
+            self.progress_at = now;
+        } else if now.since(self.progress_at) >= STALL {
+            self.progress_at = now;
+            return Progress::Stalled;
+        }
+        Progress::Underway
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RADIUS: Metres = Metres(2.0);
+
+    fn at(north_m: f32) -> Ned {
+        Ned { north_m, east_m: 0.0, down_m: -60.0 }
+    }
+
+    fn leg(purpose: Purpose) -> Leg {
+        Leg::new(Instant::ZERO, purpose, Cell::new(0, 0), Cell::new(0, 1), at(20.0))
+    }
+
+    fn after_s(secs: f32) -> Instant {
+        Instant::ZERO + Duration::from_secs_f32(secs)
+    }
+
+    #[test]
+    fn a_move_arrives_inside_the_radius_and_a_hover_not_before_its_slot() {
+        let mut leg_ = leg(Purpose::Move);
+        assert_eq!(leg_.watch(after_s(1.0), &at(17.9), RADIUS), Progress::Underway);
+        assert_eq!(leg_.watch(after_s(1.1), &at(18.1), RADIUS), Progress::Arrived);
+        let mut hover = leg(Purpose::Hover).lasting(Duration::from_secs(4));
+        assert_eq!(hover.watch(after_s(3.9), &at(20.0), RADIUS), Progress::Underway);
+        assert_eq!(hover.watch(after_s(4.0), &at(23.0), RADIUS), Progress::Underway, "blown away");
+        assert_eq!(hover.watch(after_s(4.1), &at(20.0), RADIUS), Progress::Arrived);
+        let mut hurried = leg(Purpose::Hover).lasting(Duration::from_secs(4));
+        hurried.hurry();
+        assert_eq!(hurried.watch(after_s(0.1), &at(20.0), RADIUS), Progress::Arrived);
+    }
+
+    #[test]
+    fn slow_progress_is_progress_and_none_is_a_stall() {
+        let mut slow = leg(Purpose::Move);
+        for second in 0..150 {
+            let position = at(second as f32 * 0.1);
+            assert_eq!(slow.watch(after_s(second as f32), &position, RADIUS), Progress::Underway);
+        }
+        let mut stuck = leg(Purpose::Move);
+        assert_eq!(stuck.watch(after_s(0.0), &at(0.0), RADIUS), Progress::Underway);
+        assert_eq!(stuck.watch(after_s(19.9), &at(0.4), RADIUS), Progress::Underway);
+        assert_eq!(stuck.watch(after_s(20.0), &at(0.3), RADIUS), Progress::Stalled);
+        assert_eq!(stuck.watch(after_s(39.9), &at(0.3), RADIUS), Progress::Underway, "the time starts anew");
+        assert_eq!(stuck.watch(after_s(40.0), &at(0.3), RADIUS), Progress::Stalled);
+    }
+}

@@ -1,0 +1,439 @@
+//! Mission files: TOML text to a [`Mission`] and back. Opens nothing: the program hands over the texts.
+//!
+//! ```toml
+//! terminal = [30, 18]             # cell x (east), y (north): the mission ends and lands here
+//! battery_units = 80.0            # the most that the mission may use; one unit is one move
+//!
+//! [grid]
+//! corner_lat_deg = -35.3632621    # south-west corner of cell (0, 0)
+//! corner_lon_deg = 149.1652374
+//! cell_m = 20.0
+//! heights = "city.csv"            # building heights, one row a line from north to south
+//!
+//! [fence]                         # optional: without it all of the grid may be flown over
+//! allowed = [[0, 0], [39, 29]]    # south-west and north-east cell of a rectangle
+//! excluded = [[12, 7]]            # cells taken out
+//!
+//! [[device]]
+//! id = 1                          # as in its radio reports
+//! cell = [11, 4]                  # or lat_deg and lon_deg
+//! data = 6000.0                   # data units at the start
+//! ```
+
+use crate::{DeviceSite, Mission, MissionError};
+use gleaner_guard::GuardError;
+use gleaner_units::{BatteryUnits, Cell, CellSet, CsvError, GeoPoint, GridFrame, HeightMap, Metres, Ned};
+use serde::{Deserialize, Serialize};
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+use toml::Spanned;
+
+/// What is wrong with a mission file, in one line that says where and what to do.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MissionFileError {
+    /// Not TOML, a key that does not exist, one that is missing, or a value of the wrong kind.
+    #[error("line {line}: {message}")]
+    Syntax {
+        /// Counted from 1.
+        line: usize,
+        /// What the TOML reader says.
+        message: String,
+    },
+    /// A value that makes no sense.
+    #[error("line {line}: {what}")]
+    Value {
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong and what to do.
+        what: String,
+    },
+    /// The city file could not be had; the text is the caller's.
+    #[error("line {line}: heights \"{path}\": {cause}")]
+    CityMissing {
+        /// Line of the `heights` key.
+        line: usize,
+        /// The path as the mission file has it.
+        path: String,
+        /// Why, in the caller's words.
+        cause: String,
+    },
+    /// The city file is wrong.
+    #[error("heights \"{path}\", {fault}")]
+    City {
+        /// The path as the mission file has it.
+        path: String,
+        /// Where and what.
+        fault: CsvError,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    terminal: Spanned<[i16; 2]>,
+    battery_units: Spanned<f32>,
+    grid: GridTable,
+    fence: Option<FenceTable>,
+    #[serde(default, rename = "device")]
+    devices: Vec<Spanned<DeviceTable>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GridTable {
+    corner_lat_deg: Spanned<f64>,
+    corner_lon_deg: Spanned<f64>,
+    cell_m: Spanned<f32>,
+    heights: Spanned<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FenceTable {
+    allowed: Option<Spanned<[[i16; 2]; 2]>>,
+    #[serde(default)]
+    excluded: Vec<Spanned<[i16; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DeviceTable {
+    id: u16,
+    cell: Option<[i16; 2]>,
+    lat_deg: Option<f64>,
+    lon_deg: Option<f64>,
+    data: f32,
+}
+
+/// Reads a mission file. `city` gives the text of the city file for the path in `heights`, which is relative to
+/// the mission file; its error text is passed on.
+///
+/// # Errors
+/// The first fault, see [`MissionFileError`].
+pub fn read(
+    text: &str,
+    city: impl FnOnce(&str) -> Result<String, String>,
+) -> Result<Mission, MissionFileError> {
+    let file: File = toml::from_str(text).map_err(|error| MissionFileError::Syntax {
+        line: error.span().map_or(1, |span| line_of(text, span.start)),
+        message: error.message().replace('\n', " "),
+    })?;
+    Reader { text }.mission(file, city)
+}
+
+struct Reader<'t> {
+    text: &'t str,
+}
+
+impl Reader<'_> {
+    fn line<T>(&self, value: &Spanned<T>) -> usize {
+        line_of(self.text, value.span().start)
+    }
+
+    fn fault<T>(&self, at: &Spanned<T>, what: impl Into<String>) -> MissionFileError {
+        MissionFileError::Value { line: self.line(at), what: what.into() }
+    }
+
+    fn mission(
+        &self,
+        file: File,
+        city: impl FnOnce(&str) -> Result<String, String>,
+    ) -> Result<Mission, MissionFileError> {
+        let heights = self.heights(&file.grid, city)?;
+        let corner = GeoPoint {
+            lat_deg_e7: self.degrees(&file.grid.corner_lat_deg, 90.0)?,
+            lon_deg_e7: self.degrees(&file.grid.corner_lon_deg, 180.0)?,
+        };
+        let mut mission = Mission {
+            fence: self.fence(&heights, file.fence.as_ref())?,
+            heights,
+            corner,
+            terminal: cell(*file.terminal.get_ref()),
+            budget: BatteryUnits(*file.battery_units.get_ref()),
+            devices: heapless::Vec::new(),
+        };
+        for entry in &file.devices {
+            let site = self.site(&mission, entry)?;
+            mission.devices.push(site).map_err(|_| {
+                self.fault(entry, format!("more than {} devices: take some out", crate::MAX_DEVICES))
+            })?;
+            // Checked one by one, so that the line is that of the device at fault.
+            mission.check().map_err(|error| match error {
+                MissionError::Guard(GuardError::TerminalOutsideFence | GuardError::TerminalIsolated) => {
+                    self.fault(&file.terminal, format!("{error}: move the terminal or widen the fence"))
+                }
+                MissionError::Budget => self.fault(&file.battery_units, format!("{error}: give one")),
+                _ => self.fault(entry, format!("{error}: correct this device")),
+            })?;
+        }
+        mission.check().map_err(|error| match error {
+            MissionError::Budget => self.fault(&file.battery_units, format!("{error}: give one")),
+            _ => self.fault(&file.terminal, format!("{error}: move the terminal or widen the fence")),
+        })?;
+        Ok(mission)
+    }
+
+    fn heights(
+        &self,
+        grid: &GridTable,
+        city: impl FnOnce(&str) -> Result<String, String>,
+    ) -> Result<HeightMap, MissionFileError> {
+        let path = grid.heights.get_ref().clone();
+        let cell_m = *grid.cell_m.get_ref();
+        if !(cell_m.is_finite() && cell_m > 0.0) {
+            return Err(self.fault(&grid.cell_m, "cell_m is not a length above 0: give the side in metres"));
+        }
+        let csv = city(&path).map_err(|cause| MissionFileError::CityMissing {
+            line: self.line(&grid.heights),
+            path: path.clone(),
+            cause,
+        })?;
+        HeightMap::from_csv(&csv, Metres(cell_m)).map_err(|fault| MissionFileError::City { path, fault })
+    }
+
+    fn degrees(&self, value: &Spanned<f64>, limit: f64) -> Result<i32, MissionFileError> {
+        degrees_e7(*value.get_ref(), limit)
+            .ok_or_else(|| self.fault(value, format!("not an angle from -{limit} to {limit} degrees")))
+    }
+
+    fn fence(&self, heights: &HeightMap, table: Option<&FenceTable>) -> Result<CellSet, MissionFileError> {
+        let grid = heights.grid();
+        let outside =
+            |at: Cell| format!("cell {at} is outside the {} x {} grid", grid.width(), grid.height());
+        let mut fence = CellSet::full(grid);
+        let Some(table) = table else { return Ok(fence) };
+        if let Some(allowed) = &table.allowed {
+            let [low, high] = allowed.get_ref().map(cell);
+            for corner in [low, high] {
+                if !grid.contains(corner) {
+                    return Err(self.fault(allowed, outside(corner)));
+                }
+            }
+            if low.x > high.x || low.y > high.y {
+                return Err(
+                    self.fault(allowed, "allowed wants the south-west cell first, then the north-east")
+                );
+            }
+            for at in grid.cells() {
+                if at.x < low.x || at.x > high.x || at.y < low.y || at.y > high.y {
+                    fence.remove(at);
+                }
+            }
+        }
+        for excluded in &table.excluded {
+            let at = cell(*excluded.get_ref());
+            if !grid.contains(at) {
+                return Err(self.fault(excluded, outside(at)));
+            }
+            fence.remove(at);
+        }
+        Ok(fence)
+    }
+
+    fn site(&self, mission: &Mission, entry: &Spanned<DeviceTable>) -> Result<DeviceSite, MissionFileError> {
+        let &DeviceTable { id, cell: at, lat_deg, lon_deg, data } = entry.get_ref();
+        let at = match (at, lat_deg, lon_deg) {
+            (Some(at), None, None) => cell(at),
+            (None, Some(lat_deg), Some(lon_deg)) => {
+                let point = degrees_e7(lat_deg, 90.0).zip(degrees_e7(lon_deg, 180.0));
+                let (lat_deg_e7, lon_deg_e7) = point.ok_or_else(|| {
+                    self.fault(entry, format!("device {id}: lat_deg, lon_deg are no place"))
+                })?;
+                cell_under(mission, GeoPoint { lat_deg_e7, lon_deg_e7 })
+                    .ok_or_else(|| self.fault(entry, format!("device {id} stands outside the city")))?
+            }
+            _ => {
+                return Err(self
+                    .fault(entry, format!("device {id}: give either cell = [x, y] or lat_deg and lon_deg")));
+            }
+        };
+        Ok(DeviceSite { id, cell: at, data })
+    }
+}
+
+fn cell([x, y]: [i16; 2]) -> Cell {
+    Cell::new(x, y)
+}
+
+fn cell_under(mission: &Mission, point: GeoPoint) -> Option<Cell> {
+    let (north, east) = mission.corner.offset_to(&point);
+    let position = Ned { north_m: north.0, east_m: east.0, down_m: 0.0 };
+    GridFrame::new(mission.grid(), mission.corner, mission.corner).cell(&position)
+}
+
+fn degrees_e7(degrees: f64, limit: f64) -> Option<i32> {
+    // Written so that NaN is refused.
+    (degrees >= -limit && degrees <= limit).then(|| (degrees * 1e7).round() as i32)
+}
+
+fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
+}
+
+#[derive(Serialize)]
+struct FileOut<'m> {
+    terminal: [i16; 2],
+    battery_units: f32,
+    grid: GridOut<'m>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fence: Option<FenceOut>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    device: Vec<DeviceOut>,
+}
+
+#[derive(Serialize)]
+struct GridOut<'m> {
+    corner_lat_deg: f64,
+    corner_lon_deg: f64,
+    cell_m: f32,
+    heights: &'m str,
+}
+
+#[derive(Serialize)]
+struct FenceOut {
+    excluded: Vec<[i16; 2]>,
+}
+
+#[derive(Serialize)]
+struct DeviceOut {
+    id: u16,
+    cell: [i16; 2],
+    data: f32,
+}
+
+/// Writes a mission file that [`read`] turns back into the same mission, given the city under `heights`.
+#[must_use]
+pub fn write(mission: &Mission, heights: &str) -> String {
+    let pair = |cell: Cell| [cell.x, cell.y];
+    let excluded: Vec<[i16; 2]> =
+        mission.grid().cells().filter(|&cell| !mission.fence.contains(cell)).map(pair).collect();
+    let file = FileOut {
+        terminal: pair(mission.terminal),
+        battery_units: mission.budget.0,
+        grid: GridOut {
+            corner_lat_deg: f64::from(mission.corner.lat_deg_e7) / 1e7,
+            corner_lon_deg: f64::from(mission.corner.lon_deg_e7) / 1e7,
+            cell_m: mission.grid().cell().0,
+            heights,
+        },
+        fence: (!excluded.is_empty()).then_some(FenceOut { excluded }),
+        device: mission
+            .devices
+            .iter()
+            .map(|site| DeviceOut { id: site.id, cell: pair(site.cell), data: site.data })
+            .collect(),
+    };
+    // Only maps with unrepresentable keys fail to serialise; there are none here.
+    toml::to_string(&file).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"terminal = [2, 1]
+battery_units = 20.0
+
+[grid]
+corner_lat_deg = -35.3632621
+corner_lon_deg = 149.1652374
+cell_m = 20.0
+heights = "city.csv"
+
+[fence]
+excluded = [[3, 0]]
+
+[[device]]
+id = 7
+cell = [1, 1]
+data = 6000.0
+
+[[device]]
+id = 9
+lat_deg = -35.36317
+lon_deg = 149.16568
+data = 100.0
+"#;
+
+    fn city(path: &str) -> Result<String, String> {
+        assert_eq!(path, "city.csv");
+        Ok("0,10,20,30\n1,2,3,4\n".into())
+    }
+
+    fn fails(text: &str) -> String {
+        let error = read(text, city).unwrap_err().to_string();
+        assert!(!error.contains('\n'), "one line: {error}");
+        error
+    }
+
+    #[test]
+    fn a_mission_survives_writing_and_reading() {
+        let mission = read(TEXT, city).unwrap();
+        assert_eq!(mission.terminal, Cell::new(2, 1));
+        assert_eq!(mission.corner, GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 });
+        assert_eq!(mission.heights.height_m(Cell::new(0, 0)), Some(1));
+        assert_eq!(mission.fence.len(), 7);
+        assert_eq!(mission.devices[0], DeviceSite { id: 7, cell: Cell::new(1, 1), data: 6000.0 });
+        assert_eq!(mission.devices[1].cell, Cell::new(2, 0), "from latitude and longitude");
+        let text = write(&mission, "city.csv");
+        assert_eq!(read(&text, city).unwrap(), mission, "{text}");
+    }
+
+    #[test]
+    fn faults_name_the_line_and_say_what_to_do() {
+        assert_eq!(
+            fails(&TEXT.replace("id = 9", "id = 7")),
+            "line 18: two devices have the id 7: correct this device"
+        );
+        assert_eq!(
+            fails(&TEXT.replace("cell = [1, 1]", "cell = [9, 1]")),
+            "line 13: device 7 stands outside the city: correct this device"
+        );
+        assert_eq!(
+            fails(&TEXT.replace("cell = [1, 1]\n", "")),
+            "line 13: device 7: give either cell = [x, y] or lat_deg and lon_deg"
+        );
+        assert_eq!(
+            fails(&TEXT.replace("[2, 1]", "[3, 0]")),
+            "line 1: the terminal cell is outside the fence: move the terminal or widen the fence"
+        );
+        assert_eq!(
+            fails(&TEXT.replace("20.0\n\n[grid]", "nan\n\n[grid]")),
+            "line 2: battery_units is not a number above 0: give one"
+        );
+        assert_eq!(fails(&TEXT.replace("-35.3632621", "nan")), "line 5: not an angle from -90 to 90 degrees");
+        assert_eq!(
+            fails(&TEXT.replace("cell_m = 20.0", "cell_m = -1.0")),
+            "line 7: cell_m is not a length above 0: give the side in metres"
+        );
+        assert_eq!(
+            fails(&TEXT.replace("[[3, 0]]", "[[4, 0]]")),
+            "line 11: cell (4, 0) is outside the 4 x 2 grid"
+        );
+        assert!(
+            fails(&TEXT.replace("cell_m", "cell_metres")).starts_with("line 7: unknown field `cell_metres`")
+        );
+        assert!(fails("terminal = [1").starts_with("line 1: "));
+        assert!(fails(&TEXT.replace("data = 6000.0\n", "")).starts_with("line 13: missing field `data`"));
+    }
+
+    #[test]
+    fn the_city_is_asked_for_by_its_path_and_its_faults_are_passed_on() {
+        let missing = read(TEXT, |_| Err("no such file".into())).unwrap_err();
+        assert_eq!(missing.to_string(), "line 8: heights \"city.csv\": no such file");
+        let wrong = read(TEXT, |_| Ok("1,x\n".into())).unwrap_err();
+        assert_eq!(
+            wrong.to_string(),
+            "heights \"city.csv\", line 1, value 2: not a whole number of metres from 0 to 255"
+        );
+    }
+
+    #[test]
+    fn without_a_fence_all_of_the_grid_may_be_flown_over() {
+        let text = TEXT.replace("[fence]\nexcluded = [[3, 0]]\n", "");
+        assert_eq!(read(&text, city).unwrap().fence.len(), 8);
+        let rectangle = TEXT.replace("excluded = [[3, 0]]", "allowed = [[1, 0], [2, 1]]");
+        assert_eq!(read(&rectangle, city).unwrap().fence.len(), 4);
+    }
+}
