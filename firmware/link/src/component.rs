@@ -259,6 +259,11 @@ impl Component {
         self.outgoing.withdraw_setpoint();
     }
 
+    /// Ends all requests of ours to the autopilot, without events: after a take-over none may be repeated.
+    pub fn withdraw_requests(&mut self) {
+        self.requests = Requests::default();
+    }
+
     /// Asks something of the autopilot, three times in three seconds, until it answers; ends with
     /// [`Event::RequestEnded`].
     ///
