@@ -2,7 +2,8 @@
 //!
 //! The generated types of the dialect refuse a whole message when one enumeration holds a value that they do
 //! not list. A newer autopilot's heartbeat, a command we have never heard of (which must be answered) and a
-//! local tunnel type are all of that kind, so those few messages are read and written here field by field.
+//! local tunnel type are all of that kind, so those few messages are read and written field by field. So are
+//! the fields that MAVLink 2 added to older messages: on board the generated types come without them.
 
 /// Read access by offset. Bytes beyond the end are zero: MAVLink 2 cuts trailing zeros off.
 #[derive(Clone, Copy)]
@@ -39,6 +40,10 @@ impl Fields<'_> {
 
     pub fn i32(&self, at: usize) -> i32 {
         i32::from_le_bytes(self.array(at))
+    }
+
+    pub fn i64(&self, at: usize) -> i64 {
+        i64::from_le_bytes(self.array(at))
     }
 
     pub fn f32(&self, at: usize) -> f32 {

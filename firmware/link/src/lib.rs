@@ -39,6 +39,13 @@
 #[cfg(test)]
 extern crate std;
 
+/// The same cases in every run.
+#[cfg(test)]
+fn seeded() -> proptest::test_runner::Config {
+    use proptest::test_runner::{Config, RngSeed};
+    Config { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::default() }
+}
+
 mod address;
 mod autopilot;
 mod commands;

@@ -157,10 +157,17 @@ impl Outgoing {
         self.setpoint = None;
     }
 
-    /// Fills `out` with bytes for the wire and returns how many; 0 when there is nothing to send.
+    /// Fills `out` with bytes for the wire and returns how many; 0 when there is nothing to send. Holds whole
+    /// frames when `out` takes the longest one ([`FrameBytes`]): what a datagram wants. A shorter `out` gets
+    /// them in pieces.
     pub fn transmit(&mut self, sender: Address, out: &mut [u8]) -> usize {
+        let room = out.len();
         let mut written = 0;
         for slot in out {
+            let between_frames = self.left >= self.leaving.len();
+            if between_frames && written > 0 && room - written < HEADER + LONGEST_PAYLOAD + CHECKSUM {
+                break;
+            }
             let Some(byte) = self.next_byte(sender) else { break };
             *slot = byte;
             written += 1;
@@ -193,5 +200,41 @@ impl Outgoing {
             .or_else(|| self.setpoint.take())
             .or_else(|| self.urgent.pop_front())
             .or_else(|| self.bulk.pop_front())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_buffer_for_the_longest_frame_never_gets_half_of_one() {
+        let own = Address::new(1, 191);
+        let payload = [1; LONGEST_PAYLOAD];
+        let queue = || {
+            let mut outgoing = Outgoing::new();
+            for length in [160, 1, 80, 160, 30, 9] {
+                let packet = Packet::from_payload(0, 50, &payload[..length]).unwrap();
+                assert!(outgoing.push(Priority::Urgent, packet));
+            }
+            outgoing
+        };
+        let total = 160 + 1 + 80 + 160 + 30 + 9 + 6 * (HEADER + CHECKSUM);
+        for room in [1, 16, 171, 172, 280, 1024] {
+            let (mut outgoing, mut out, mut sum) = (queue(), std::vec![0; room], 0);
+            loop {
+                let written = outgoing.transmit(own, &mut out);
+                if written == 0 {
+                    break;
+                }
+                sum += written;
+                let mut rest = &out[..written];
+                while room >= 172 && !rest.is_empty() {
+                    assert_eq!(rest[0], MAGIC);
+                    rest = &rest[HEADER + usize::from(rest[1]) + CHECKSUM..];
+                }
+            }
+            assert_eq!(sum, total, "room {room}");
+        }
     }
 }

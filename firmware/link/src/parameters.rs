@@ -344,6 +344,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::seeded())]
+
         #[test]
         fn whatever_is_asked_the_values_stay_inside(asks in proptest::collection::vec((0u16..9, any::<f32>()), 0..40)) {
             let mut parameters = Parameters::default();

@@ -3,8 +3,9 @@
 use crate::{Outgoing, Packet, Priority, Severity};
 use core::fmt::{self, Write};
 use gleaner_units::{Duration, Instant};
-use heapless::{Deque, String};
-use mavlink::dialects::ardupilotmega::{MavSeverity, STATUSTEXT_DATA};
+use heapless::{Deque, String, Vec};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::STATUSTEXT_DATA;
 
 /// Bytes of one `STATUSTEXT`.
 const CHUNK: usize = 50;
@@ -96,21 +97,12 @@ impl Texts {
     }
 }
 
+/// One `STATUSTEXT`: severity, text, id, chunk number.
 fn chunk(text: &Text, id: u16, chunk_seq: u8) -> Option<Packet> {
-    let mut bytes = [0; CHUNK];
     let rest = text.text.as_bytes().iter().skip(usize::from(chunk_seq) * CHUNK);
-    for (slot, byte) in bytes.iter_mut().zip(rest) {
-        *slot = *byte;
-    }
-    let severity = match text.severity {
-        Severity::Emergency => MavSeverity::MAV_SEVERITY_EMERGENCY,
-        Severity::Alert => MavSeverity::MAV_SEVERITY_ALERT,
-        Severity::Critical => MavSeverity::MAV_SEVERITY_CRITICAL,
-        Severity::Error => MavSeverity::MAV_SEVERITY_ERROR,
-        Severity::Warning => MavSeverity::MAV_SEVERITY_WARNING,
-        Severity::Notice => MavSeverity::MAV_SEVERITY_NOTICE,
-        Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
-        Severity::Debug => MavSeverity::MAV_SEVERITY_DEBUG,
-    };
-    Packet::new(&STATUSTEXT_DATA { severity, text: bytes.into(), id, chunk_seq })
+    let padded = rest.copied().chain(core::iter::repeat(0)).take(CHUNK);
+    let [id_low, id_high] = id.to_le_bytes();
+    let payload: Vec<u8, { CHUNK + 4 }> =
+        [text.severity as u8].into_iter().chain(padded).chain([id_low, id_high, chunk_seq]).collect();
+    Packet::from_payload(STATUSTEXT_DATA::ID, STATUSTEXT_DATA::EXTRA_CRC, &payload)
 }

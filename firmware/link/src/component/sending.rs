@@ -59,14 +59,14 @@ impl Component {
 
     pub(super) fn send_timesync(&mut self, now: Instant, asker: Address, asked_ns: i64) {
         let now_ns = i64::try_from(now.as_micros()).unwrap_or(i64::MAX).saturating_mul(1_000);
-        // 0 would make it a request.
-        let answer = dialect::TIMESYNC_DATA {
-            tc1: now_ns.max(1),
-            ts1: asked_ns,
-            target_system: asker.system,
-            target_component: asker.component,
-        };
-        self.send(Priority::Bulk, Packet::new(&answer));
+        let mut payload: Vec<u8, 18> = Vec::new();
+        // tc1 of 0 would make it a request.
+        for bytes in [now_ns.max(1).to_le_bytes(), asked_ns.to_le_bytes()] {
+            let _ = payload.extend_from_slice(&bytes);
+        }
+        let _ = payload.extend_from_slice(&[asker.system, asker.component]);
+        let id = dialect::TIMESYNC_DATA::ID;
+        self.send(Priority::Bulk, Packet::from_payload(id, dialect::TIMESYNC_DATA::EXTRA_CRC, &payload));
     }
 
     pub(super) fn send_autopilot_version(&mut self) {

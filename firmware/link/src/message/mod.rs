@@ -182,12 +182,12 @@ impl Message {
                 Message::StatusText { severity: fields.u8(0), text }
             }
             dialect::TIMESYNC_DATA::ID => {
-                let data = parse::<dialect::TIMESYNC_DATA>(frame)?;
-                if data.tc1 != 0 {
+                // tc1 at 0, ts1 at 8, then the MAVLink 2 target; an answer has tc1.
+                if fields.i64(0) != 0 {
                     return Ok(None);
                 }
-                let target = Address::new(data.target_system, data.target_component);
-                Message::TimesyncRequest { target, asked_ns: data.ts1 }
+                let target = Address::new(fields.u8(16), fields.u8(17));
+                Message::TimesyncRequest { target, asked_ns: fields.i64(8) }
             }
             dialect::TUNNEL_DATA::ID => read_tunnel(fields, frame.payload())?,
             _ => return Ok(None),
