@@ -16,8 +16,8 @@ fn step(c: &mut Criterion) {
         .collect();
     let mut episode = Episode::new(world.clone(), &realizations[0], Seed::training(0)).expect("same city");
     let mut number = 0;
+    let mut turn = 0;
     c.bench_function("step, 6 devices", |b| {
-        let mut turn = 0;
         b.iter(|| {
             turn += 1;
             if turn % 64 == 0 {

@@ -48,7 +48,7 @@ impl City {
     /// See [`CityError`].
     ///
     /// # Cost
-    /// Decides line of sight for every pair of an open cell and a cell: about ten milliseconds for 40 x 30 cells.
+    /// Decides line of sight for every pair of an open cell and a cell: tens of milliseconds for 40 x 30 cells.
     pub fn new(heights: HeightMap) -> Result<City, CityError> {
         let tallest_m = heights.as_slice().iter().copied().max().unwrap_or(0);
         if u16::from(tallest_m) >= City::ALTITUDE_M {

@@ -22,11 +22,9 @@ impl SightTable {
         let words_per_row = grid.len().div_ceil(64);
         let mut rows = vec![NO_ROW; grid.len()];
         let mut bits = Vec::new();
-        let mut row_count = 0;
-        for (index, device) in grid.cells().enumerate().filter(|&(_, cell)| heights.height_m(cell) == Some(0))
-        {
-            rows[index] = row_count;
-            row_count += 1;
+        let open = grid.cells().enumerate().filter(|&(_, cell)| heights.height_m(cell) == Some(0));
+        for (row, (index, device)) in (0..).zip(open) {
+            rows[index] = row;
             let begin = bits.len();
             bits.resize(begin + words_per_row, 0);
             for (column, uav) in grid.cells().enumerate() {
@@ -54,13 +52,13 @@ impl SightTable {
 ///
 /// Walks the cells that the line crosses, in order (Amanatides and Woo). The line rises all the way, so it is
 /// lowest over a cell where it enters it: at the fraction t of its length it is `t * altitude_m` high, and a
-/// building taller than that blocks it. A line through the exact corner of four cells enters the opposite
-/// one and skips the two that it only touches. All fractions are compared as products of whole numbers, so
-/// the answer is exact and the same everywhere, and so in every mirror image of the city.
+/// building taller than that blocks it. Buildings are closed: a line through the exact corner of four cells
+/// touches the two beside its way, and they block it too. Touching a roof does not. All fractions are
+/// compared as products of whole numbers, so the answer is exact, the same everywhere and in every mirror
+/// image of the city.
 fn ray_is_clear(heights: &HeightMap, altitude_m: u16, device: Cell, uav: Cell) -> bool {
     let (width, height) = (i64::from(uav.x.abs_diff(device.x)), i64::from(uav.y.abs_diff(device.y)));
     let (step_x, step_y) = ((uav.x - device.x).signum(), (uav.y - device.y).signum());
-    let altitude_m = i64::from(altitude_m);
     let mut cell = device;
     let (mut crossed_x, mut crossed_y) = (0, 0);
     while crossed_x < width || crossed_y < height {
@@ -69,16 +67,23 @@ fn ray_is_clear(heights: &HeightMap, altitude_m: u16, device: Cell, uav: Cell) -
         let (next_x, next_y) = (2 * crossed_x + 1, 2 * crossed_y + 1);
         let order = (next_x * height).cmp(&(next_y * width));
         let (numerator, denominator) = if order.is_gt() { (next_y, 2 * height) } else { (next_x, 2 * width) };
+        let blocks = |cell: Cell| {
+            let building_m = i64::from(heights.height_m(cell).unwrap_or(0));
+            i64::from(altitude_m) * numerator < building_m * denominator
+        };
+        let (over_x, over_y) = (cell.x + step_x, cell.y + step_y);
+        if order.is_eq() && (blocks(Cell::new(over_x, cell.y)) || blocks(Cell::new(cell.x, over_y))) {
+            return false;
+        }
         if order.is_le() {
-            cell.x += step_x;
+            cell.x = over_x;
             crossed_x += 1;
         }
         if order.is_ge() {
-            cell.y += step_y;
+            cell.y = over_y;
             crossed_y += 1;
         }
-        let building_m = i64::from(heights.height_m(cell).unwrap_or(0));
-        if altitude_m * numerator < building_m * denominator {
+        if blocks(cell) {
             return false;
         }
     }
@@ -107,11 +112,13 @@ mod tests {
     }
 
     #[test]
-    fn a_diagonal_skips_the_corners_it_touches() {
-        let map = city("50,0\n0,50\n");
-        assert!(ray_is_clear(&map, 60, Cell::new(0, 0), Cell::new(1, 1)));
-        let map = city("0,50\n0,0\n");
-        assert!(!ray_is_clear(&map, 60, Cell::new(0, 0), Cell::new(1, 1)));
+    fn a_diagonal_is_blocked_by_each_corner_it_touches() {
+        // The corner lies at half of the line: 30 m high. The first row of the text is the northern one.
+        let diagonal = |text: &str| ray_is_clear(&city(text), 60, Cell::new(0, 0), Cell::new(1, 1));
+        assert!(diagonal("30,30\n0,30\n"), "touching a roof is clear");
+        assert!(!diagonal("31,0\n0,0\n"), "the north-western corner");
+        assert!(!diagonal("0,0\n0,31\n"), "the south-eastern corner");
+        assert!(!diagonal("0,31\n0,0\n"), "the cell beyond");
     }
 
     #[test]
