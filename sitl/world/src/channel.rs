@@ -78,7 +78,7 @@ impl Channel {
         self.transmit + gain - self.noise
     }
 
-    /// Data units that one slot carries at this SNR (paper, eq. 8); nothing below the threshold.
+    /// Data units that one slot carries at this SNR (paper, eq. 6); nothing below the threshold.
     #[must_use]
     pub fn data_per_slot(&self, snr: Db) -> f32 {
         if snr >= self.threshold {

@@ -127,7 +127,7 @@ impl Episode {
         })
     }
 
-    /// The vector reward of a step of this episode (paper, eq. 14): data in percent of what all devices held at the
+    /// The vector reward of a step of this episode (paper, eq. 12): data in percent of what all devices held at the
     /// start, and minus the energy in battery units.
     #[must_use]
     pub fn reward(&self, step: &Step) -> [f32; 2] {

@@ -98,7 +98,7 @@ impl Field {
     }
 
     /// Serves one slot at the SNR heard last: of the reachable devices with data left the one with the highest SNR (the
-    /// first of equals) sends what the slot carries, at most what it has (paper, eq. 8 to 10).
+    /// first of equals) sends what the slot carries, at most what it has (paper, eq. 6 to 8).
     pub fn serve(&mut self, world: &World) -> Option<Serving> {
         let mut best: Option<(usize, Db)> = None;
         for (index, device) in self.devices.iter().enumerate() {
