@@ -46,8 +46,8 @@ pub(crate) fn check(mission: &Mission, guard: &Guard, inputs: &Inputs<'_>) -> Re
         return Err(Missing::GuidedMode);
     }
     let down_m = home_down_m - altitude.0;
-    // Written so that NaN is refused.
-    if !((position.down_m - down_m).abs() <= ALTITUDE_TOLERANCE_M) {
+    let off_m = (position.down_m - down_m).abs();
+    if off_m.is_nan() || off_m > ALTITUDE_TOLERANCE_M {
         return Err(Missing::Altitude);
     }
     let frame = GridFrame::new(mission.grid(), mission.corner, origin);

@@ -30,9 +30,8 @@ pub(crate) struct Flight {
     speed_asked: Option<MetresPerSecond>,
 }
 
-/// What the analysis of one poll says about a flight.
-enum Verdict {
-    Fly(Ned),
+/// Why a flight ends at once.
+enum Upset {
     /// A heartbeat shows a mode that we did not ask for.
     Taken,
     /// A heartbeat shows the landing that we asked for, or its end.
@@ -57,8 +56,7 @@ impl Flight {
 
     /// From now on the guard flies. The leg that is under way is finished first: its end is a cell that the
     /// guard allowed, with the way home paid for. A hover is cut short.
-    pub(crate) fn go_home(mut self, now: Instant, reason: ReturnReason) -> Phase {
-        let _ = now;
+    pub(crate) fn go_home(mut self, reason: ReturnReason) -> Phase {
         self.leg.hurry();
         Phase::Homing(self, reason)
     }
@@ -77,29 +75,29 @@ impl Flight {
 
     /// Looks, without acting. The human pilot comes first: whatever else is wrong, a mode that we did not ask
     /// for means that nothing of ours may go out.
-    fn judge(&mut self, now: Instant, late: bool, inputs: &Inputs<'_>) -> Verdict {
+    fn judge(&mut self, now: Instant, late: bool, inputs: &Inputs<'_>) -> Result<Ned, Upset> {
         let vehicle = inputs.vehicle;
         if vehicle.ready {
             self.ready_at = now;
         }
         if vehicle.is_taken() || inputs.other_mode_seen {
-            return match self.landing {
-                Some(_) if vehicle.is_landing_or_returning() => Verdict::Landing,
-                _ => Verdict::Taken,
-            };
+            return Err(match self.landing {
+                Some(_) if vehicle.is_landing_or_returning() => Upset::Landing,
+                _ => Upset::Taken,
+            });
         }
         if vehicle.mode.is_none() {
-            return Verdict::Fault(Fault::AutopilotLost);
+            return Err(Upset::Fault(Fault::AutopilotLost));
         }
         if !vehicle.armed {
-            return if self.landing.is_some() { Verdict::Landing } else { Verdict::Disarmed };
+            return Err(if self.landing.is_some() { Upset::Landing } else { Upset::Disarmed });
         }
         if late {
-            return Verdict::Fault(Fault::Late);
+            return Err(Upset::Fault(Fault::Late));
         }
         match vehicle.position.filter(Ned::is_finite) {
-            Some(position) if now.since(self.ready_at) <= UNREADY => Verdict::Fly(position),
-            _ => Verdict::Fault(Fault::PositionLost),
+            Some(position) if now.since(self.ready_at) <= UNREADY => Ok(position),
+            _ => Err(Upset::Fault(Fault::PositionLost)),
         }
     }
 
@@ -156,12 +154,12 @@ impl Machine {
         out: &mut Outputs,
     ) -> Phase {
         let position = match flight.judge(now, late, inputs) {
-            Verdict::Fly(position) => position,
-            verdict => return give_up(verdict, inputs, out),
+            Ok(position) => position,
+            Err(upset) => return give_up(upset, inputs, out),
         };
         flight.keep_speed(inputs, out);
         if inputs.vehicle.failsafe {
-            return flight.go_home(now, ReturnReason::Failsafe);
+            return flight.go_home(ReturnReason::Failsafe);
         }
         match flight.watch(now, &position, inputs.parameters) {
             Progress::Underway => Phase::Engaged(flight),
@@ -172,7 +170,7 @@ impl Machine {
             Progress::Stalled => {
                 flight.stalls = 1;
                 flight.turn_back(now, &position, |cell| self.guard.distance(cell).is_some());
-                flight.go_home(now, ReturnReason::NoProgress)
+                flight.go_home(ReturnReason::NoProgress)
             }
         }
     }
@@ -187,8 +185,8 @@ impl Machine {
         out: &mut Outputs,
     ) -> Phase {
         let position = match flight.judge(now, late, inputs) {
-            Verdict::Fly(position) => position,
-            verdict => return give_up(verdict, inputs, out),
+            Ok(position) => position,
+            Err(upset) => return give_up(upset, inputs, out),
         };
         if flight.landing.is_some() {
             return landing(flight, reason, inputs, out);
@@ -224,10 +222,10 @@ impl Machine {
         out: &mut Outputs,
     ) -> Phase {
         if !self.guard.is_feasible(flight.leg.cell, flight.battery(inputs)) {
-            return flight.go_home(now, ReturnReason::Battery);
+            return flight.go_home(ReturnReason::Battery);
         }
         match self.deliberation(now, State::Engaged, &flight, inputs).by_policy(policy) {
-            Err(reason) => flight.go_home(now, reason),
+            Err(reason) => flight.go_home(reason),
             Ok(decision) => {
                 self.follow(now, &mut flight, decision, inputs, out);
                 Phase::Engaged(flight)
@@ -302,14 +300,12 @@ fn landing(mut flight: Flight, reason: ReturnReason, inputs: &Inputs<'_>, out: &
     Phase::Homing(flight, reason)
 }
 
-fn give_up(verdict: Verdict, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
-    match verdict {
-        // Never reached: the caller flies on.
-        Verdict::Fly(_) => Phase::Passive,
-        Verdict::Taken => Phase::Passive,
-        Verdict::Landing => Phase::Done { landed: !inputs.vehicle.armed },
-        Verdict::Disarmed => Phase::Idle,
-        Verdict::Fault(kind) => fault(kind, inputs, out),
+fn give_up(upset: Upset, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+    match upset {
+        Upset::Taken => Phase::Passive,
+        Upset::Landing => Phase::Done { landed: !inputs.vehicle.armed },
+        Upset::Disarmed => Phase::Idle,
+        Upset::Fault(kind) => fault(kind, inputs, out),
     }
 }
 

@@ -43,7 +43,8 @@ impl Ledger {
 
 /// Battery units behind a percentage.
 pub(crate) fn charge(percent: u8, full: BatteryUnits) -> BatteryUnits {
-    full * (f32::from(percent.min(100)) / 100.0)
+    // In this order, so that whole results are exact.
+    BatteryUnits(full.0 * f32::from(percent.min(100)) / 100.0)
 }
 
 pub(crate) fn smaller(a: BatteryUnits, b: BatteryUnits) -> BatteryUnits {

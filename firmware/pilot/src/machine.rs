@@ -170,7 +170,7 @@ impl Machine {
             };
         }
         if let Some(request) = inputs.request {
-            phase = self.answer(now, phase, request, inputs, &mut out);
+            phase = self.answer(phase, request, inputs, &mut out);
         }
         self.phase = match phase {
             Phase::Boot | Phase::Idle => Phase::Idle,
@@ -305,8 +305,7 @@ impl Machine {
 
     /// The operator's word comes before everything but the self-test.
     fn answer(
-        &mut self,
-        now: Instant,
+        &self,
         phase: Phase,
         request: Request,
         inputs: &Inputs<'_>,
@@ -326,7 +325,7 @@ impl Machine {
             (Request::Engage, flying @ (Phase::Engaged(_) | Phase::Homing(..))) => flying,
             (Request::Engage, _) => Phase::Waiting(Wait::new(inputs.vehicle)),
             (Request::Shadow, _) => Phase::Shadow(ShadowWatch::default()),
-            (Request::Return, Phase::Engaged(flight)) => flight.go_home(now, ReturnReason::Request),
+            (Request::Return, Phase::Engaged(flight)) => flight.go_home(ReturnReason::Request),
             (Request::Return, flying @ Phase::Homing(..)) => flying,
             (Request::Return, other) => {
                 out.say(Severity::Warning, format_args!("gleaner: return refused, not engaged"));

@@ -8,7 +8,7 @@ use crate::{
 use core::fmt;
 use gleaner_link::{
     AutopilotCommand, Component, Enable, Event, LinkStats, OperatorRequest, Outcome, ParameterId, Parameters,
-    PositionTarget, SettingsError, Status, TUNNEL_DECISION,
+    PositionTarget, SettingsError, Severity, Status, TUNNEL_DECISION,
 };
 use gleaner_policy::{DeviceState, Policy, SelfTestError};
 use gleaner_radio::{DeviceTable, ReportDecoder, ReportStats, decode_body};
@@ -248,6 +248,12 @@ impl<P: Policy> Onboard<P> {
     /// How long the last inference took, measured by the program (a clock is an input); sent as `infer_us`.
     pub fn set_inference_time(&mut self, took: Duration) {
         self.inference_time = Some(took);
+    }
+
+    /// One line for the operator from the program around the pilot, such as a port that went down; leaves with
+    /// the next polls as `STATUSTEXT`.
+    pub fn say(&mut self, severity: Severity, text: fmt::Arguments<'_>) {
+        self.link.say(severity, text);
     }
 
     fn take_events(&mut self, now: Instant) -> Told {

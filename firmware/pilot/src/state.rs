@@ -194,3 +194,48 @@ impl Fault {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One `STATUSTEXT` has 50 characters; a longer line would arrive cut.
+    #[test]
+    fn every_reason_fits_one_status_text() {
+        let missing = [
+            Missing::Autopilot,
+            Missing::FailsafeClear,
+            Missing::Estimator,
+            Missing::Position,
+            Missing::Origin,
+            Missing::Home,
+            Missing::Battery,
+            Missing::SafeAltitude,
+            Missing::Armed,
+            Missing::GuidedMode,
+            Missing::Altitude,
+            Missing::InsideFence,
+            Missing::EnoughBattery,
+        ];
+        assert!(missing.iter().all(|missing| missing.text().len() <= 50 - "gleaner: waiting: ".len()));
+        let reasons = [
+            ReturnReason::Terminal,
+            ReturnReason::Request,
+            ReturnReason::Battery,
+            ReturnReason::Failsafe,
+            ReturnReason::Policy,
+            ReturnReason::NoProgress,
+        ];
+        assert!(reasons.iter().all(|reason| reason.text().len() <= 50 - "gleaner: going home: ".len()));
+        let faults = [
+            Fault::SelfTest,
+            Fault::AutopilotLost,
+            Fault::PositionLost,
+            Fault::Late,
+            Fault::NoProgress,
+            Fault::LandingRefused,
+            Fault::NoWayHome,
+        ];
+        assert!(faults.iter().all(|fault| fault.text().len() <= 50 - "gleaner: fault: ".len()));
+    }
+}

@@ -1,0 +1,261 @@
+//! A machine in virtual time, with an aircraft that flies to the last target in a straight line.
+#![allow(dead_code)]
+
+use gleaner_guard::Guard;
+use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters};
+use gleaner_pilot::{
+    DeviceSite, Inputs, Machine, Mission, Outputs, Request, State, Vehicle,
+};
+use gleaner_policy::{Attention, DeviceState, Inference, Policy, Tokens};
+use gleaner_units::{
+    Action, BatteryUnits, Cell, CellSet, Duration, GeoPoint, Grid, GridFrame, HeightMap, Instant, Metres, Ned,
+};
+
+pub const CORNER: GeoPoint = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 };
+pub const TERMINAL: Cell = Cell::new(6, 4);
+pub const START: Cell = Cell::new(1, 1);
+pub const DOWN_M: f32 = -60.0 + HOME_DOWN_M;
+/// Home lies below the estimator's origin here, so that mixing them up shows.
+pub const HOME_DOWN_M: f32 = 2.5;
+const POLL: Duration = Duration::from_millis(50);
+const FLIGHT_MPS: f32 = 10.0;
+
+pub fn mission() -> Mission {
+    let grid = Grid::new(8, 6, Metres(20.0)).unwrap();
+    let mut fence = CellSet::full(grid);
+    fence.remove(Cell::new(3, 3));
+    let site = |id, x, y, data| DeviceSite { id, cell: Cell::new(x, y), data };
+    let mission = Mission {
+        heights: HeightMap::flat(grid),
+        fence,
+        corner: CORNER,
+        terminal: TERMINAL,
+        budget: BatteryUnits(30.0),
+        devices: heapless::Vec::from_slice(&[site(7, 2, 4, 6000.0), site(9, 5, 1, 2000.0)]).unwrap(),
+    };
+    mission.check().unwrap();
+    mission
+}
+
+/// Answers as it was told, and keeps what it was asked.
+pub struct Scripted {
+    pub actions: std::collections::VecDeque<Action>,
+    /// When the script is over.
+    pub then: Action,
+    pub fails: bool,
+    pub logit: f32,
+    pub asked: Vec<Tokens>,
+}
+
+impl Policy for Scripted {
+    type Error = ();
+
+    fn infer(&mut self, tokens: &Tokens) -> Result<Inference, ()> {
+        self.asked.push(tokens.clone());
+        if self.fails {
+            return Err(());
+        }
+        let wanted = self.actions.pop_front().unwrap_or(self.then);
+        let mut logits = [0.0; Action::COUNT];
+        logits[wanted.index()] = self.logit;
+        Ok(Inference { logits, attention: Attention::NONE })
+    }
+}
+
+pub struct Rig {
+    pub machine: Machine,
+    pub mission: Mission,
+    pub vehicle: Vehicle,
+    pub parameters: Parameters,
+    pub devices: Vec<DeviceState>,
+    pub policy: Scripted,
+    pub now: Instant,
+    pub request: Option<Request>,
+    pub other_mode_seen: bool,
+    pub ended: Vec<(AutopilotCommand, bool)>,
+    /// Whether the autopilot accepts commands, or refuses them; `None`: no answer.
+    pub accepts: Option<bool>,
+    /// Whether the aircraft flies to its targets.
+    pub obeys: bool,
+    pub target: Option<Ned>,
+    pub texts: Vec<String>,
+    pub setpoints: Vec<(u64, Ned)>,
+    pub commands: Vec<(u64, AutopilotCommand)>,
+    pub actions: Vec<Action>,
+}
+
+impl Rig {
+    /// An aircraft with everything in place but the request.
+    pub fn new() -> Rig {
+        Rig::with(mission(), true)
+    }
+
+    pub fn with(mission: Mission, self_test_passed: bool) -> Rig {
+        let devices = mission
+            .devices
+            .iter()
+            .map(|site| DeviceState { cell: site.cell, remaining: site.data, snr: None })
+            .collect();
+        let mut rig = Rig {
+            machine: Machine::new(mission.clone(), self_test_passed).unwrap(),
+            mission,
+            vehicle: Vehicle {
+                firmware: Some(Firmware::ArduPilot),
+                mode: Some(FlightMode::Guided),
+                armed: true,
+                ready: true,
+                origin: Some(CORNER.offset_by(Metres(-100.0), Metres(50.0))),
+                home_down_m: Some(HOME_DOWN_M),
+                battery_percent: Some(90),
+                ..Vehicle::default()
+            },
+            parameters: Parameters::default(),
+            devices,
+            policy: Scripted {
+                actions: Default::default(),
+                then: Action::Hover,
+                fails: false,
+                logit: 1.0,
+                asked: Vec::new(),
+            },
+            now: Instant::from_millis(10_000),
+            request: None,
+            other_mode_seen: false,
+            ended: Vec::new(),
+            accepts: Some(true),
+            obeys: true,
+            target: None,
+            texts: Vec::new(),
+            setpoints: Vec::new(),
+            commands: Vec::new(),
+            actions: Vec::new(),
+        };
+        rig.place(START, 3.0);
+        rig
+    }
+
+    /// Puts the aircraft `off_m` east of a cell's centre, at the flight altitude.
+    pub fn place(&mut self, cell: Cell, off_m: f32) {
+        let centre = self.centre(cell);
+        self.vehicle.position = Some(Ned { east_m: centre.east_m + off_m, ..centre });
+    }
+
+    pub fn frame(&self) -> GridFrame {
+        GridFrame::new(self.mission.grid(), CORNER, CORNER.offset_by(Metres(-100.0), Metres(50.0)))
+    }
+
+    pub fn centre(&self, cell: Cell) -> Ned {
+        self.frame().centre(cell, DOWN_M)
+    }
+
+    pub fn guard(&self) -> Guard {
+        self.mission.guard(self.parameters.reserve()).unwrap()
+    }
+
+    pub fn state(&self) -> State {
+        self.machine.state()
+    }
+
+    pub fn set(&mut self, name: &str, value: f32) {
+        self.parameters.set(name, value).unwrap();
+    }
+
+    /// One poll, 50 ms after the last.
+    pub fn step(&mut self) -> Outputs {
+        self.step_after(POLL)
+    }
+
+    pub fn step_after(&mut self, pause: Duration) -> Outputs {
+        self.now = self.now + pause;
+        self.fly(pause);
+        let ended = std::mem::take(&mut self.ended);
+        let inputs = Inputs {
+            vehicle: &self.vehicle,
+            devices: &self.devices,
+            parameters: &self.parameters,
+            request: self.request.take(),
+            other_mode_seen: std::mem::take(&mut self.other_mode_seen),
+            ended: &ended,
+        };
+        let out = self.machine.poll(self.now, &inputs, &mut self.policy);
+        let at_ms = self.now.as_millis();
+        if let Some(target) = out.setpoint {
+            self.target = Some(target);
+            self.setpoints.push((at_ms, target));
+        }
+        if let Some(command) = out.command {
+            self.commands.push((at_ms, command));
+            self.answer(command);
+        }
+        self.texts.extend(out.notices.iter().map(|notice| notice.text.to_string()));
+        if out.decided {
+            self.actions.push(self.machine.decision().unwrap().action);
+        }
+        out
+    }
+
+    pub fn run(&mut self, secs: f32) {
+        let end = self.now + Duration::from_secs_f32(secs);
+        while self.now < end {
+            self.step();
+        }
+    }
+
+    /// Polls until the state is reached.
+    pub fn run_to(&mut self, state: State) {
+        for _ in 0..20 * 600 {
+            if self.state() == state {
+                return;
+            }
+            self.step();
+        }
+        panic!("still {:?} after ten minutes, said {:?}", self.state(), self.texts);
+    }
+
+    /// Engaged, before the first decision.
+    pub fn engaged() -> Rig {
+        let mut rig = Rig::new();
+        rig.engage();
+        rig
+    }
+
+    pub fn engage(&mut self) {
+        self.request = Some(Request::Engage);
+        self.step();
+        assert_eq!(self.state(), State::Engaged, "{:?}", self.texts);
+    }
+
+    pub fn said(&self, text: &str) -> usize {
+        self.texts.iter().filter(|line| line.contains(text)).count()
+    }
+
+    pub fn commanded(&self, command: AutopilotCommand) -> usize {
+        self.commands.iter().filter(|(_, sent)| *sent == command).count()
+    }
+
+    fn answer(&mut self, command: AutopilotCommand) {
+        let Some(accepted) = self.accepts else { return };
+        self.ended.push((command, accepted));
+        if accepted {
+            match command {
+                AutopilotCommand::Land => self.vehicle.mode = Some(FlightMode::Land),
+                AutopilotCommand::ReturnToLaunch => self.vehicle.mode = Some(FlightMode::Return),
+                AutopilotCommand::ChangeSpeed(_) => {}
+            }
+        }
+    }
+
+    fn fly(&mut self, pause: Duration) {
+        let (Some(position), Some(target)) = (self.vehicle.position, self.target) else { return };
+        if !(self.obeys && self.vehicle.armed && self.vehicle.is_guided()) {
+            return;
+        }
+        let distance_m = position.horizontal_distance(&target).0;
+        let share = (FLIGHT_MPS * pause.as_secs_f32() / distance_m.max(1e-3)).min(1.0);
+        self.vehicle.position = Some(Ned {
+            north_m: position.north_m + (target.north_m - position.north_m) * share,
+            east_m: position.east_m + (target.east_m - position.east_m) * share,
+            down_m: target.down_m,
+        });
+    }
+}
