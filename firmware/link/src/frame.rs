@@ -61,7 +61,8 @@ pub struct DecodeStats {
     pub signed: u32,
     /// Candidates with a wrong checksum: damaged frames, and garbage that looked like a frame.
     pub bad_crc: u32,
-    /// Candidates with an id outside the dialect. Not an error: newer senders have newer messages.
+    /// Candidates with an id outside the dialect (MAVLink 1: outside what we need). Not an error: newer senders
+    /// have newer messages.
     pub unknown_message: u32,
     /// Candidates with an incompatibility flag that we do not know.
     pub incompatible: u32,
@@ -212,6 +213,9 @@ fn front_v1(held: &[u8]) -> Front {
     let &[_, length, sequence, system, component, id, ..] = held else {
         return Front::Incomplete;
     };
+    if length_v1(id) != Some(length) {
+        return Front::UnknownMessage;
+    }
     let header = Header {
         sender: Address::new(system, component),
         sequence,
@@ -239,6 +243,31 @@ fn front_v2(held: &[u8]) -> Front {
         signed: flags & FLAG_SIGNED != 0,
     };
     header.verify(held, HEADER_V2, usize::from(length))
+}
+
+/// Payload length of the MAVLink 1 messages that we need. Eight bits of id and no flags make a MAVLink 1 header
+/// easy to mistake noise for, so only these are believed, and only with their exact length.
+const fn length_v1(message_id: u8) -> Option<u8> {
+    Some(match message_id {
+        0 => 9,
+        1 => 31,
+        20 => 20,
+        21 => 2,
+        23 => 23,
+        32 | 33 => 28,
+        49 => 12,
+        65 | 230 => 42,
+        75 => 35,
+        76 => 33,
+        77 => 3,
+        111 => 16,
+        147 => 36,
+        193 => 22,
+        242 => 52,
+        245 => 2,
+        253 => 51,
+        _ => return None,
+    })
 }
 
 struct Header {
@@ -278,5 +307,25 @@ impl Header {
             signed: self.signed,
             payload,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_of_mavlink_1_are_those_of_the_other_implementation() {
+        let lines =
+            include_str!("../tests/golden/lengths_v1.txt").lines().filter(|line| !line.starts_with('#'));
+        let mut checked = 0;
+        for line in lines {
+            let (id, length) = line.split_once(' ').unwrap();
+            if let Some(ours) = length_v1(id.parse().unwrap()) {
+                assert_eq!(ours, length.parse::<u8>().unwrap(), "message {id}");
+                checked += 1;
+            }
+        }
+        assert_eq!(checked, (0..=255).filter(|&id| length_v1(id).is_some()).count());
     }
 }

@@ -118,7 +118,11 @@ impl Streams {
             stream.only.is_none_or(|only| only == firmware || matches!(firmware, Firmware::Other(_)))
                 && self.progress.get(row).is_some_and(|progress| progress.needs_asking(now, stream))
         };
-        self.asking = STREAMS.iter().enumerate().find(missing).map(|(row, stream)| {
+        // The one that has waited longest; in the order of need among equals.
+        let waiting_since =
+            |&(row, _): &(usize, &Stream)| self.progress.get(row).map(|progress| progress.ask_at);
+        let next = STREAMS.iter().enumerate().filter(missing).min_by_key(waiting_since);
+        self.asking = next.map(|(row, stream)| {
             let interval_us = stream.period.as_micros() as f32;
             send(
                 target,
@@ -129,8 +133,7 @@ impl Streams {
             (row, now)
         });
         if let Some(progress) = self.asking.and_then(|(row, _)| self.progress.get_mut(row)) {
-            // Unanswered, the others get their turn first.
-            progress.ask_at = now + Duration::from_secs(2);
+            progress.ask_at = now + Streams::ANSWER;
         }
     }
 }
