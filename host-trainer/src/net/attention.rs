@@ -30,8 +30,8 @@ fn columns_of(qkv: &[f32], rows: &[u32], part: usize, head: usize) -> [Lanes; HE
     let mut columns = [Lanes::ZERO; HEAD_WIDTH];
     for (j, &row) in rows.iter().enumerate().take(LANES) {
         let lanes = head_of(qkv, row, part, head);
-        for c in 0..HEAD_WIDTH {
-            columns[c].0[j] = lanes.0[c];
+        for (column, &number) in columns.iter_mut().zip(&lanes.0) {
+            column.0[j] = number;
         }
     }
     columns
@@ -40,20 +40,23 @@ fn columns_of(qkv: &[f32], rows: &[u32], part: usize, head: usize) -> [Lanes; HE
 /// `sum over c of weights[c] * columns[c]`.
 #[inline(always)]
 fn combine<const FUSED: bool>(weights: Lanes, columns: &[Lanes; HEAD_WIDTH]) -> Lanes {
-    let mut even = Lanes::ZERO;
-    let mut odd = Lanes::ZERO;
-    for c in 0..HEAD_WIDTH / 2 {
-        even = Lanes::splat(weights.0[2 * c]).mul_add::<FUSED>(columns[2 * c], even);
-        odd = Lanes::splat(weights.0[2 * c + 1]).mul_add::<FUSED>(columns[2 * c + 1], odd);
+    let mut sum = Lanes::ZERO;
+    for (weight, column) in weights.0.iter().zip(columns) {
+        sum = Lanes::splat(*weight).mul_add::<FUSED>(*column, sum);
     }
-    even.add(odd)
+    sum
+}
+
+/// 0 for the first `tokens` lanes, minus infinity for the spare ones.
+#[inline(always)]
+fn mask(tokens: usize) -> Lanes {
+    let mut mask = Lanes::splat(f32::NEG_INFINITY);
+    mask.0[..tokens].fill(0.0);
+    mask
 }
 
 #[inline(always)]
-fn softmax<const FUSED: bool>(mut scores: Lanes, tokens: usize) -> Lanes {
-    for j in 0..LANES {
-        scores.0[j] = if j < tokens { scores.0[j] } else { f32::NEG_INFINITY };
-    }
+fn softmax<const FUSED: bool>(scores: Lanes) -> Lanes {
     let exponentials = scores.sub(Lanes::splat(scores.largest())).exp::<FUSED>();
     exponentials.mul(Lanes::splat(1.0 / exponentials.sum()))
 }
@@ -66,6 +69,7 @@ fn attend_body<const FUSED: bool>(
     mixed: &mut [f32],
 ) {
     for (start, rows) in tokens.samples() {
+        let mask = mask(rows.len());
         let kept = &mut probabilities[start * KEPT..(start + rows.len()) * KEPT];
         for (head, kept) in kept.chunks_exact_mut(rows.len() * LANES).enumerate() {
             let keys = columns_of(qkv, rows, 1, head);
@@ -75,7 +79,7 @@ fn attend_body<const FUSED: bool>(
             }
             for (&row, kept) in rows.iter().zip(kept.chunks_exact_mut(LANES)) {
                 let query = head_of(qkv, row, 0, head).mul(Lanes::splat(SCALE));
-                let row_of = softmax::<FUSED>(combine::<FUSED>(query, &keys), rows.len());
+                let row_of = softmax::<FUSED>(combine::<FUSED>(query, &keys).add(mask));
                 row_of.store(kept);
                 let mut sum = Lanes::ZERO;
                 for (value, &p) in values.iter().zip(&row_of.0).take(rows.len()) {

@@ -112,6 +112,15 @@ impl Lanes {
         self
     }
 
+    /// The larger of each number and 0.
+    #[inline(always)]
+    pub fn rectified(mut self) -> Self {
+        for i in 0..LANES {
+            self.0[i] = if self.0[i] > 0.0 { self.0[i] } else { 0.0 };
+        }
+        self
+    }
+
     /// `self * a + b`.
     #[inline(always)]
     pub fn mul_add<const FUSED: bool>(mut self, a: Self, b: Self) -> Self {

@@ -1,91 +1,297 @@
 //! Matrix products: the three that a linear layer needs.
 //!
-//! All matrices are stored row by row. The products run on one thread and are deterministic.
+//! All matrices are stored row by row. Weights are first cut into panels of sixteen columns, once for a whole batch,
+//! so that the inner loop reads them one after another; it then keeps a tile of a few rows by sixteen columns in
+//! registers. Every number of a product is summed in the order of the inner index, whatever the tile, so the
+//! results do not depend on the tile's size.
 
-use gemm::Parallelism;
-
+use super::lanes::{LANES, Lanes, vectorised};
 use super::rowwise::add_rows;
-use super::shape::Linear;
+use super::shape::{Layout, Linear};
 
-/// A matrix by its numbers and the distance between rows and between columns.
-#[derive(Clone, Copy)]
-struct View<'a> {
-    numbers: &'a [f32],
-    row_stride: usize,
-    column_stride: usize,
+/// Rows of a tile: with AVX2, six rows of sixteen take twelve of the sixteen registers.
+const TILE: usize = 6;
+
+/// A matrix cut into panels of [`LANES`] columns, the last filled up with zeros.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Panels {
+    numbers: Vec<f32>,
+    rows: usize,
+    columns: usize,
 }
 
-impl<'a> View<'a> {
-    fn rows(numbers: &'a [f32], columns: usize) -> Self {
-        Self { numbers, row_stride: columns, column_stride: 1 }
+impl Panels {
+    fn prepare(&mut self, rows: usize, columns: usize) {
+        (self.rows, self.columns) = (rows, columns);
+        self.numbers.clear();
+        self.numbers.resize(columns.div_ceil(LANES) * rows * LANES, 0.0);
     }
 
-    fn transposed(numbers: &'a [f32], columns: usize) -> Self {
-        Self { numbers, row_stride: 1, column_stride: columns }
+    /// Cuts up a matrix of `columns` columns.
+    pub fn cut(&mut self, matrix: &[f32], columns: usize) {
+        self.prepare(matrix.len() / columns, columns);
+        let panels = self.numbers.chunks_exact_mut(self.rows * LANES);
+        for (first, panel) in (0..columns).step_by(LANES).zip(panels) {
+            let width = LANES.min(columns - first);
+            for (row, place) in matrix.chunks_exact(columns).zip(panel.chunks_exact_mut(LANES)) {
+                place[..width].copy_from_slice(&row[first..first + width]);
+            }
+        }
     }
 
-    fn covers(&self, rows: usize, columns: usize) -> bool {
-        rows == 0
-            || columns == 0
-            || (rows - 1) * self.row_stride + (columns - 1) * self.column_stride < self.numbers.len()
+    /// Cuts up the transpose of a matrix of `columns` columns.
+    pub fn cut_transposed(&mut self, matrix: &[f32], columns: usize) {
+        self.prepare(columns, matrix.len() / columns);
+        let panels = self.numbers.chunks_exact_mut(self.rows * LANES);
+        for (rows, panel) in matrix.chunks(LANES * columns).zip(panels) {
+            for (lane, row) in rows.chunks_exact(columns).enumerate() {
+                for (place, &value) in panel.chunks_exact_mut(LANES).zip(row) {
+                    place[lane] = value;
+                }
+            }
+        }
     }
 }
 
-/// `c += a b` with `a` of `[rows, inner]`, `b` of `[inner, columns]`, `c` of `[rows, columns]`.
-fn add_product(rows: usize, inner: usize, columns: usize, a: View<'_>, b: View<'_>, c: &mut [f32]) {
-    assert!(a.covers(rows, inner) && b.covers(inner, columns) && c.len() == rows * columns);
-    if c.is_empty() {
+/// What becomes of a product.
+#[derive(Clone, Copy, PartialEq)]
+enum Then {
+    Store,
+    Add,
+    Rectify,
+}
+
+/// Writes a tile's row, `width` numbers of it.
+#[inline(always)]
+fn finish(value: Lanes, then: Then, place: &mut [f32]) {
+    if let Some(place) = place.first_chunk_mut::<LANES>() {
+        match then {
+            Then::Store => *place = value.0,
+            Then::Add => *place = Lanes(*place).add(value).0,
+            Then::Rectify => *place = value.rectified().0,
+        }
         return;
     }
-    // SAFETY: the three matrices lie within their slices (checked above), and `c` is borrowed
-    // mutably, so it overlaps neither `a` nor `b`.
-    unsafe {
-        gemm::gemm(
-            rows,
-            columns,
-            inner,
-            c.as_mut_ptr(),
-            1,
-            columns as isize,
-            true,
-            a.numbers.as_ptr(),
-            a.column_stride as isize,
-            a.row_stride as isize,
-            b.numbers.as_ptr(),
-            b.column_stride as isize,
-            b.row_stride as isize,
-            1.0,
-            1.0,
-            false,
-            false,
-            false,
-            Parallelism::None,
-        );
+    for (place, &value) in place.iter_mut().zip(&value.0) {
+        *place = match then {
+            Then::Store => value,
+            Then::Add => *place + value,
+            Then::Rectify => value.max(0.0),
+        };
+    }
+}
+
+/// [`TILE`] rows of `a` times one panel, on top of `start`.
+#[inline(always)]
+fn tile<const FUSED: bool>(a: &[f32], inner: usize, panel: &[f32], start: Lanes) -> [Lanes; TILE] {
+    let (a0, a) = a.split_at(inner);
+    let (a1, a) = a.split_at(inner);
+    let (a2, a) = a.split_at(inner);
+    let (a3, a) = a.split_at(inner);
+    let (a4, a5) = a.split_at(inner);
+    let mut sums = [start; TILE];
+    let a = a0.iter().zip(a1).zip(a2).zip(a3).zip(a4).zip(a5);
+    for ((((((a0, a1), a2), a3), a4), a5), b) in a.zip(panel.as_chunks::<LANES>().0) {
+        let a = [a0, a1, a2, a3, a4, a5];
+        for row in 0..TILE {
+            sums[row] = Lanes::splat(*a[row]).mul_add::<FUSED>(Lanes(*b), sums[row]);
+        }
+    }
+    sums
+}
+
+/// One row times one panel.
+#[inline(always)]
+fn single<const FUSED: bool>(a: &[f32], panel: &[f32], start: Lanes) -> Lanes {
+    let mut sum = start;
+    for (a, b) in a.iter().zip(panel.as_chunks::<LANES>().0) {
+        sum = Lanes::splat(*a).mul_add::<FUSED>(Lanes(*b), sum);
+    }
+    sum
+}
+
+/// As [`tile`] for the transpose of `a`, from its column `first` on.
+#[inline(always)]
+fn tile_of_transpose<const FUSED: bool, const ROWS: usize>(
+    a: &[f32],
+    columns: usize,
+    first: usize,
+    panel: &[f32],
+) -> [Lanes; ROWS] {
+    let mut sums = [Lanes::ZERO; ROWS];
+    for (a, b) in a.chunks_exact(columns).zip(panel.as_chunks::<LANES>().0) {
+        let Some(a) = a[first..].first_chunk::<ROWS>() else { break };
+        for row in 0..ROWS {
+            sums[row] = Lanes::splat(a[row]).mul_add::<FUSED>(Lanes(*b), sums[row]);
+        }
+    }
+    sums
+}
+
+#[inline(always)]
+fn product_body<const FUSED: bool>(a: &[f32], b: &Panels, bias: &[f32], then: Then, c: &mut [f32]) {
+    let (inner, columns) = (b.rows, b.columns);
+    for (first, panel) in (0..columns).step_by(LANES).zip(b.numbers.chunks_exact(inner * LANES)) {
+        let width = LANES.min(columns - first);
+        let mut start = Lanes::ZERO;
+        for (start, bias) in start.0.iter_mut().zip(bias.iter().skip(first)) {
+            *start = *bias;
+        }
+        let blocks = a.chunks(TILE * inner).zip(c.chunks_mut(TILE * columns));
+        for (a, c) in blocks {
+            if a.len() == TILE * inner {
+                let sums = tile::<FUSED>(a, inner, panel, start);
+                for (value, c) in sums.into_iter().zip(c.chunks_exact_mut(columns)) {
+                    finish(value, then, &mut c[first..first + width]);
+                }
+            } else {
+                for (a, c) in a.chunks_exact(inner).zip(c.chunks_exact_mut(columns)) {
+                    let value = single::<FUSED>(a, panel, start);
+                    finish(value, then, &mut c[first..first + width]);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add_transposed_product_body<const FUSED: bool>(a: &[f32], a_columns: usize, b: &Panels, c: &mut [f32]) {
+    let columns = b.columns;
+    for (first, panel) in (0..columns).step_by(LANES).zip(b.numbers.chunks_exact(b.rows * LANES)) {
+        let width = LANES.min(columns - first);
+        let full = a_columns - a_columns % TILE;
+        for (at, c) in (0..full).step_by(TILE).zip(c.chunks_exact_mut(TILE * columns)) {
+            let sums = tile_of_transpose::<FUSED, TILE>(a, a_columns, at, panel);
+            for (value, c) in sums.into_iter().zip(c.chunks_exact_mut(columns)) {
+                finish(value, Then::Add, &mut c[first..first + width]);
+            }
+        }
+        for (at, c) in (full..a_columns).zip(c[full * columns..].chunks_exact_mut(columns)) {
+            let [value] = tile_of_transpose::<FUSED, 1>(a, a_columns, at, panel);
+            finish(value, Then::Add, &mut c[first..first + width]);
+        }
+    }
+}
+
+vectorised! {
+    /// `c = then(a b + bias)`, or added to `c`; `bias` may be shorter, which means 0.
+    fn product(a: &[f32], b: &Panels, bias: &[f32], then: Then, c: &mut [f32]) = product_body
+}
+
+vectorised! {
+    /// `c += a^T b`.
+    fn add_transposed_product(a: &[f32], a_columns: usize, b: &Panels, c: &mut [f32]) =
+        add_transposed_product_body
+}
+
+/// The weights of all linear layers cut into panels, by [`Linear::index`].
+#[derive(Clone, Debug, Default)]
+pub(super) struct CutWeights(Vec<Panels>);
+
+impl CutWeights {
+    /// Cuts every weight, or its transpose.
+    fn cut(&mut self, layout: &Layout, mut cut: impl FnMut(&Linear, &mut Panels)) {
+        self.0.resize_with(layout.linear_count, Panels::default);
+        for linear in layout.linears() {
+            cut(&linear, &mut self.0[linear.index]);
+        }
+    }
+
+    /// Prepares the forward direction.
+    pub fn cut_forward(&mut self, layout: &Layout, parameters: &[f32]) {
+        self.cut(layout, |linear, panels| panels.cut_transposed(linear.weight(parameters), linear.inputs));
+    }
+
+    /// Prepares the backward direction.
+    pub fn cut_backward(&mut self, layout: &Layout, parameters: &[f32]) {
+        self.cut(layout, |linear, panels| panels.cut(linear.weight(parameters), linear.inputs));
     }
 }
 
 impl Linear {
-    /// `y = x W^T + b` for `rows` rows.
-    pub fn forward(&self, parameters: &[f32], rows: usize, x: &[f32], y: &mut [f32]) {
-        let bias = self.bias(parameters);
-        for row in y.chunks_exact_mut(self.outputs) {
-            row.copy_from_slice(bias);
-        }
-        let w = View::transposed(self.weight(parameters), self.inputs);
-        add_product(rows, self.inputs, self.outputs, View::rows(x, self.inputs), w, y);
+    /// `y = x W^T + b`; `weights` cut for the forward direction.
+    pub fn forward(&self, parameters: &[f32], weights: &CutWeights, x: &[f32], y: &mut [f32]) {
+        product(x, &weights.0[self.index], self.bias(parameters), Then::Store, y);
+    }
+
+    /// `y = max(x W^T + b, 0)`.
+    pub fn forward_rectified(&self, parameters: &[f32], weights: &CutWeights, x: &[f32], y: &mut [f32]) {
+        product(x, &weights.0[self.index], self.bias(parameters), Then::Rectify, y);
+    }
+
+    /// `dx = dy W`; `weights` cut for the backward direction.
+    pub fn backward_input(&self, weights: &CutWeights, dy: &[f32], dx: &mut [f32]) {
+        product(dy, &weights.0[self.index], &[], Then::Store, dx);
     }
 
     /// `dx += dy W`.
-    pub fn backward_input(&self, parameters: &[f32], rows: usize, dy: &[f32], dx: &mut [f32]) {
-        let w = View::rows(self.weight(parameters), self.inputs);
-        add_product(rows, self.outputs, self.inputs, View::rows(dy, self.outputs), w, dx);
+    pub fn add_backward_input(&self, weights: &CutWeights, dy: &[f32], dx: &mut [f32]) {
+        product(dy, &weights.0[self.index], &[], Then::Add, dx);
     }
 
-    /// `dW += dy^T x` and `db += ` the sum of the rows of `dy`.
-    pub fn backward_parameters(&self, rows: usize, x: &[f32], dy: &[f32], gradients: &mut [f32]) {
+    /// `dW += dy^T x` and `db += ` the sum of the rows of `dy`; `panels` is scratch.
+    pub fn backward_parameters(&self, x: &[f32], dy: &[f32], panels: &mut Panels, gradients: &mut [f32]) {
         let (weight, bias) = self.split_mut(gradients);
-        let dy_t = View::transposed(dy, self.outputs);
-        add_product(self.outputs, rows, self.inputs, dy_t, View::rows(x, self.inputs), weight);
+        panels.cut(x, self.inputs);
+        add_transposed_product(dy, self.outputs, panels, weight);
         add_rows(dy, bias);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A matrix of small whole numbers, whose sums are exact in any order.
+    fn whole(rows: usize, columns: usize, step: usize) -> Vec<f32> {
+        (0..rows * columns).map(|index| (index * step % 15) as f32 - 7.0).collect()
+    }
+
+    /// Every size of remainder: rows beyond a tile, columns beyond a panel.
+    const SIZES: [(usize, usize, usize); 5] = [(1, 1, 1), (7, 3, 5), (6, 16, 16), (13, 4, 33), (25, 19, 70)];
+
+    #[test]
+    fn products_are_exact_on_whole_numbers() {
+        for (rows, inner, columns) in SIZES {
+            let (a, w) = (whole(rows, inner, 7), whole(columns, inner, 11));
+            let (bias, before) = (whole(1, columns, 4), whole(rows, columns, 2));
+            let mut panels = Panels::default();
+            panels.cut_transposed(&w, inner);
+            for then in [Then::Store, Then::Add, Then::Rectify] {
+                let (mut fast, mut portable) = (before.clone(), before.clone());
+                product(&a, &panels, &bias, then, &mut fast);
+                product_body::<false>(&a, &panels, &bias, then, &mut portable);
+                assert_eq!(fast, portable);
+                for (index, found) in fast.into_iter().enumerate() {
+                    let (row, column) = (index / columns, index % columns);
+                    let terms = (0..inner).map(|k| a[row * inner + k] * w[column * inner + k]);
+                    let value = bias[column] + terms.sum::<f32>();
+                    let expected = match then {
+                        Then::Store => value,
+                        Then::Add => before[index] + value,
+                        Then::Rectify => value.max(0.0),
+                    };
+                    assert_eq!(found, expected, "{rows} x {inner} x {columns} at {row}, {column}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn transposed_products_are_exact_on_whole_numbers() {
+        for (inner, rows, columns) in SIZES {
+            let (a, b, before) = (whole(inner, rows, 7), whole(inner, columns, 11), whole(rows, columns, 2));
+            let mut panels = Panels::default();
+            panels.cut(&b, columns);
+            let (mut fast, mut portable) = (before.clone(), before.clone());
+            add_transposed_product(&a, rows, &panels, &mut fast);
+            add_transposed_product_body::<false>(&a, rows, &panels, &mut portable);
+            assert_eq!(fast, portable);
+            for (index, found) in fast.into_iter().enumerate() {
+                let (row, column) = (index / columns, index % columns);
+                let terms = (0..inner).map(|k| a[k * rows + row] * b[k * columns + column]);
+                assert_eq!(found, before[index] + terms.sum::<f32>(), "{inner} x {rows} x {columns}");
+            }
+        }
     }
 }

@@ -2,7 +2,8 @@
 
 use super::attention::{attend, attend_backward};
 use super::batch::Batch;
-use super::rowwise::{add_and_norm, norm_backward, rectify, rectify_backward};
+use super::matrix::CutWeights;
+use super::rowwise::{add_and_norm, norm_backward, rectify_backward};
 use super::shape::{EncoderLayout, FIXED_TOKENS, HEAD_INPUTS, LAYERS, Layout, Linear, Shape, WIDTH};
 use super::workspace::{Activations, CHUNK, LayerActivations, Scratch, Tokens, Workspace};
 
@@ -25,11 +26,13 @@ pub fn forward<'a>(
     let chunks = batch.len().div_ceil(CHUNK);
     workspace.chunks.resize_with(chunks.max(workspace.chunks.len()), Activations::default);
     workspace.outputs.resize(batch.len() * shape.outputs, 0.0);
+    workspace.forward_weights.cut_forward(&layout, parameters);
+    let net = Net { layout: &layout, parameters, weights: &workspace.forward_weights };
     let outputs = workspace.outputs.chunks_mut(CHUNK * shape.outputs);
     for (index, (chunk, outputs)) in workspace.chunks.iter_mut().zip(outputs).enumerate() {
         let first = index * CHUNK;
         chunk.prepare(*shape, batch, first..batch.len().min(first + CHUNK));
-        forward_chunk(&layout, parameters, batch, chunk, outputs);
+        forward_chunk(net, batch, chunk, outputs);
     }
     &workspace.outputs
 }
@@ -51,9 +54,11 @@ pub fn backward(
     let layout = layout_for(shape, parameters);
     assert_eq!(gradients.len(), layout.len, "one gradient a parameter");
     assert_eq!(d_outputs.len(), batch.len() * shape.outputs, "one gradient an output");
-    let Workspace { chunks, scratch, .. } = workspace;
+    workspace.backward_weights.cut_backward(&layout, parameters);
+    let Workspace { chunks, scratch, backward_weights: weights, .. } = workspace;
+    let net = Net { layout: &layout, parameters, weights };
     for (chunk, d_outputs) in chunks.iter().zip(d_outputs.chunks(CHUNK * shape.outputs)) {
-        backward_chunk(&layout, parameters, batch, chunk, scratch, d_outputs, gradients);
+        backward_chunk(net, batch, chunk, scratch, d_outputs, gradients);
     }
 }
 
@@ -74,19 +79,31 @@ pub fn forward_backward(
     assert_eq!(gradients.len(), layout.len, "one gradient a parameter");
     workspace.chunks.resize_with(workspace.chunks.len().max(1), Activations::default);
     workspace.outputs.resize(batch.len() * shape.outputs, 0.0);
-    let Workspace { chunks, scratch, outputs } = workspace;
+    workspace.forward_weights.cut_forward(&layout, parameters);
+    workspace.backward_weights.cut_backward(&layout, parameters);
+    let Workspace { chunks, scratch, outputs, forward_weights, backward_weights } = workspace;
+    let ahead = Net { layout: &layout, parameters, weights: forward_weights };
+    let back = Net { weights: backward_weights, ..ahead };
     let chunk = &mut chunks[0];
-    let mut d_outputs = [0.0; 256];
-    assert!(CHUNK * shape.outputs <= d_outputs.len(), "at most 16 outputs");
+    let mut d_outputs = std::mem::take(&mut scratch.d_outputs);
     for (index, outputs) in outputs.chunks_mut(CHUNK * shape.outputs).enumerate() {
         let first = index * CHUNK;
         let samples = first..batch.len().min(first + CHUNK);
         chunk.prepare(*shape, batch, samples.clone());
-        forward_chunk(&layout, parameters, batch, chunk, outputs);
-        let d_outputs = &mut d_outputs[..outputs.len()];
-        loss(samples, outputs, d_outputs);
-        backward_chunk(&layout, parameters, batch, chunk, scratch, d_outputs, gradients);
+        forward_chunk(ahead, batch, chunk, outputs);
+        d_outputs.resize(outputs.len(), 0.0);
+        loss(samples, outputs, &mut d_outputs);
+        backward_chunk(back, batch, chunk, scratch, &d_outputs, gradients);
     }
+    scratch.d_outputs = d_outputs;
+}
+
+/// A network and its weights cut for one direction.
+#[derive(Clone, Copy)]
+struct Net<'a> {
+    layout: &'a Layout,
+    parameters: &'a [f32],
+    weights: &'a CutWeights,
 }
 
 fn layout_for(shape: &Shape, parameters: &[f32]) -> Layout {
@@ -100,44 +117,36 @@ fn projectors(layout: &Layout) -> [Linear; 4] {
     [layout.project_uav, layout.project_preference, layout.project_map, layout.project_device]
 }
 
-fn forward_chunk(
-    layout: &Layout,
-    parameters: &[f32],
-    batch: &Batch,
-    chunk: &mut Activations,
-    outputs: &mut [f32],
-) {
-    let samples = chunk.samples.len();
+fn forward_chunk(net: Net<'_>, batch: &Batch, chunk: &mut Activations, outputs: &mut [f32]) {
+    let Net { layout, parameters, weights } = net;
     let inputs = chunk.inputs(batch);
     let mut place = &mut chunk.embedded[..];
     for (projector, input) in projectors(layout).into_iter().zip(inputs) {
-        let rows = input.len() / projector.inputs;
-        let (block, rest) = place.split_at_mut(rows * WIDTH);
-        projector.forward(parameters, rows, input, block);
+        let (block, rest) = place.split_at_mut(input.len() / projector.inputs * WIDTH);
+        projector.forward(parameters, weights, input, block);
         place = rest;
     }
     let mut x = &chunk.embedded;
     for (encoder, layer) in layout.encoder.iter().zip(&mut chunk.layers) {
-        forward_layer(encoder, parameters, &chunk.tokens, x, layer);
+        forward_layer(net, encoder, &chunk.tokens, x, layer);
         x = &layer.out;
     }
     join(&chunk.tokens, x, &mut chunk.joined, &mut chunk.pooled_from);
-    layout.head[0].forward(parameters, samples, &chunk.joined, &mut chunk.hidden);
-    rectify(&mut chunk.hidden);
-    layout.head[1].forward(parameters, samples, &chunk.hidden, outputs);
+    layout.head[0].forward_rectified(parameters, weights, &chunk.joined, &mut chunk.hidden);
+    layout.head[1].forward(parameters, weights, &chunk.hidden, outputs);
 }
 
 fn forward_layer(
+    net: Net<'_>,
     encoder: &EncoderLayout,
-    parameters: &[f32],
     tokens: &Tokens,
     x: &[f32],
     layer: &mut LayerActivations,
 ) {
-    let rows = tokens.len();
-    encoder.qkv.forward(parameters, rows, x, &mut layer.qkv);
+    let Net { parameters, weights, .. } = net;
+    encoder.qkv.forward(parameters, weights, x, &mut layer.qkv);
     attend(tokens, &layer.qkv, &mut layer.probabilities, &mut layer.mixed);
-    encoder.out.forward(parameters, rows, &layer.mixed, &mut layer.middle);
+    encoder.out.forward(parameters, weights, &layer.mixed, &mut layer.middle);
     add_and_norm(
         x,
         encoder.norm1.gain(parameters),
@@ -146,9 +155,8 @@ fn forward_layer(
         &mut layer.normalised1,
         &mut layer.inverse_deviation1,
     );
-    encoder.ff1.forward(parameters, rows, &layer.middle, &mut layer.hidden);
-    rectify(&mut layer.hidden);
-    encoder.ff2.forward(parameters, rows, &layer.hidden, &mut layer.out);
+    encoder.ff1.forward_rectified(parameters, weights, &layer.middle, &mut layer.hidden);
+    encoder.ff2.forward(parameters, weights, &layer.hidden, &mut layer.out);
     add_and_norm(
         &layer.middle,
         encoder.norm2.gain(parameters),
@@ -189,73 +197,66 @@ fn token(x: &[f32], row: u32) -> &[f32] {
 }
 
 fn backward_chunk(
-    layout: &Layout,
-    parameters: &[f32],
+    net: Net<'_>,
     batch: &Batch,
     chunk: &Activations,
     scratch: &mut Scratch,
     d_outputs: &[f32],
     gradients: &mut [f32],
 ) {
-    let samples = chunk.samples.len();
+    let Net { layout, weights, .. } = net;
+    scratch.prepare(chunk);
     let [head0, head1] = &layout.head;
-    head1.backward_parameters(samples, &chunk.hidden, d_outputs, gradients);
-    let d_head = cleared(&mut scratch.d_head, chunk.hidden.len());
-    head1.backward_input(parameters, samples, d_outputs, d_head);
-    rectify_backward(&chunk.hidden, d_head);
-    head0.backward_parameters(samples, &chunk.joined, d_head, gradients);
-    let d_joined = cleared(&mut scratch.d_joined, chunk.joined.len());
-    head0.backward_input(parameters, samples, d_head, d_joined);
-    cleared(&mut scratch.d_tokens, chunk.embedded.len());
+    head1.backward_parameters(&chunk.hidden, d_outputs, &mut scratch.panels, gradients);
+    head1.backward_input(weights, d_outputs, &mut scratch.d_head);
+    rectify_backward(&chunk.hidden, &mut scratch.d_head);
+    head0.backward_parameters(&chunk.joined, &scratch.d_head, &mut scratch.panels, gradients);
+    head0.backward_input(weights, &scratch.d_head, &mut scratch.d_joined);
     separate(&chunk.tokens, &scratch.d_joined, &chunk.pooled_from, &mut scratch.d_tokens);
 
     for index in (0..LAYERS).rev() {
         let x = if index == 0 { &chunk.embedded } else { &chunk.layers[index - 1].out };
         let (encoder, layer) = (&layout.encoder[index], &chunk.layers[index]);
-        backward_layer(encoder, parameters, &chunk.tokens, x, layer, scratch, gradients);
+        backward_layer(net, encoder, &chunk.tokens, x, layer, scratch, gradients);
     }
 
     let mut d = &scratch.d_tokens[..];
     for (projector, input) in projectors(layout).into_iter().zip(chunk.inputs(batch)) {
-        let rows = input.len() / projector.inputs;
-        let (block, rest) = d.split_at(rows * WIDTH);
-        projector.backward_parameters(rows, input, block, gradients);
+        let (block, rest) = d.split_at(input.len() / projector.inputs * WIDTH);
+        projector.backward_parameters(input, block, &mut scratch.panels, gradients);
         d = rest;
     }
 }
 
 /// Turns `scratch.d_tokens` from the gradient of the layer's output into that of its input `x`.
 fn backward_layer(
+    net: Net<'_>,
     encoder: &EncoderLayout,
-    parameters: &[f32],
     tokens: &Tokens,
     x: &[f32],
     layer: &LayerActivations,
     scratch: &mut Scratch,
     gradients: &mut [f32],
 ) {
-    let rows = tokens.len();
-    let d = &mut scratch.d_tokens[..];
+    let Net { parameters, weights, .. } = net;
+    let Scratch { d_tokens: d, d_hidden, d_mixed, d_qkv, panels, .. } = scratch;
     let (d_gain, d_bias) = encoder.norm2.split_mut(gradients);
     let gain = encoder.norm2.gain(parameters);
     norm_backward(gain, &layer.normalised2, &layer.inverse_deviation2, d, d_gain, d_bias);
-    encoder.ff2.backward_parameters(rows, &layer.hidden, d, gradients);
-    let d_hidden = cleared(&mut scratch.d_hidden, layer.hidden.len());
-    encoder.ff2.backward_input(parameters, rows, d, d_hidden);
+    encoder.ff2.backward_parameters(&layer.hidden, d, panels, gradients);
+    encoder.ff2.backward_input(weights, d, d_hidden);
     rectify_backward(&layer.hidden, d_hidden);
-    encoder.ff1.backward_parameters(rows, &layer.middle, d_hidden, gradients);
-    encoder.ff1.backward_input(parameters, rows, d_hidden, d);
+    encoder.ff1.backward_parameters(&layer.middle, d_hidden, panels, gradients);
+    encoder.ff1.add_backward_input(weights, d_hidden, d);
 
     let (d_gain, d_bias) = encoder.norm1.split_mut(gradients);
     let gain = encoder.norm1.gain(parameters);
     norm_backward(gain, &layer.normalised1, &layer.inverse_deviation1, d, d_gain, d_bias);
-    encoder.out.backward_parameters(rows, &layer.mixed, d, gradients);
-    let d_mixed = cleared(&mut scratch.d_mixed, layer.mixed.len());
-    encoder.out.backward_input(parameters, rows, d, d_mixed);
-    let d_qkv = cleared(&mut scratch.d_qkv, layer.qkv.len());
+    encoder.out.backward_parameters(&layer.mixed, d, panels, gradients);
+    encoder.out.backward_input(weights, d, d_mixed);
     attend_backward(tokens, &layer.qkv, &layer.probabilities, d_mixed, d_qkv);
-    encoder.qkv.backward_parameters(rows, x, d_qkv, gradients);
-    encoder.qkv.backward_input(parameters, rows, d_qkv, d);
+    encoder.qkv.backward_parameters(x, d_qkv, panels, gradients);
+    encoder.qkv.add_backward_input(weights, d_qkv, d);
 }
 
 /// The way back through [`join`].
@@ -266,17 +267,13 @@ fn separate(tokens: &Tokens, d_joined: &[f32], pooled_from: &[u32], d_tokens: &m
         for (d, &row) in fixed.chunks_exact(WIDTH).zip(rows) {
             d_tokens[row as usize * WIDTH..][..WIDTH].copy_from_slice(d);
         }
+        for &row in &rows[FIXED_TOKENS..] {
+            d_tokens[row as usize * WIDTH..][..WIDTH].fill(0.0);
+        }
         if rows.len() > FIXED_TOKENS {
             for (column, (&row, d)) in from.iter().zip(pooled).enumerate() {
                 d_tokens[row as usize * WIDTH + column] = *d;
             }
         }
     }
-}
-
-/// A matrix of zeros in memory that is already there.
-fn cleared(matrix: &mut Vec<f32>, len: usize) -> &mut [f32] {
-    matrix.clear();
-    matrix.resize(len, 0.0);
-    matrix
 }

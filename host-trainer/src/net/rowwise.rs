@@ -102,13 +102,6 @@ fn norm_backward_body<const FUSED: bool>(
 }
 
 #[inline(always)]
-fn rectify_body<const FUSED: bool>(x: &mut [f32]) {
-    for x in x {
-        *x = if *x > 0.0 { *x } else { 0.0 };
-    }
-}
-
-#[inline(always)]
 fn rectify_backward_body<const FUSED: bool>(rectified: &[f32], d: &mut [f32]) {
     for (d, rectified) in d.iter_mut().zip(rectified) {
         *d = if *rectified > 0.0 { *d } else { 0.0 };
@@ -148,11 +141,6 @@ vectorised! {
         d_gain: &mut [f32],
         d_bias: &mut [f32],
     ) = norm_backward_body
-}
-
-vectorised! {
-    /// `x = max(x, 0)`.
-    pub(super) fn rectify(x: &mut [f32]) = rectify_body
 }
 
 vectorised! {

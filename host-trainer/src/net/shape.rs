@@ -76,6 +76,8 @@ impl Tensor {
 /// Where a linear layer `y = x W^T + b` lies: the weight `[outputs, inputs]`, then the bias.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Linear {
+    /// Its place among the layers, below [`Layout::linear_count`].
+    pub index: usize,
     pub offset: usize,
     pub inputs: usize,
     pub outputs: usize,
@@ -138,16 +140,18 @@ pub(super) struct Layout {
     pub project_device: Linear,
     pub encoder: [EncoderLayout; LAYERS],
     pub head: [Linear; 2],
+    pub linear_count: usize,
     pub len: usize,
 }
 
 impl Layout {
     pub fn new(shape: Shape) -> Self {
-        let mut len = 0;
+        let (mut len, mut linear_count) = (0, 0);
         let mut linear = |inputs, outputs| {
-            let offset = len;
+            let linear = Linear { index: linear_count, offset: len, inputs, outputs };
             len += (inputs + 1) * outputs;
-            Linear { offset, inputs, outputs }
+            linear_count += 1;
+            linear
         };
         let project_uav = linear(UAV_FEATURES, WIDTH);
         let project_preference = linear(PREFERENCE_FEATURES, WIDTH);
@@ -164,27 +168,34 @@ impl Layout {
             EncoderLayout { qkv, out, norm1, ff1, ff2, norm2 }
         });
         let head = [linear(HEAD_INPUTS, shape.head), linear(shape.head, shape.outputs)];
-        Self { project_uav, project_preference, project_map, project_device, encoder, head, len }
+        Self {
+            project_uav,
+            project_preference,
+            project_map,
+            project_device,
+            encoder,
+            head,
+            linear_count,
+            len,
+        }
     }
 
-    /// The linear layers by name, in the order of the flat vector.
-    fn linears(&self) -> Vec<(String, Linear)> {
-        let mut list = vec![
-            ("project_uav".to_owned(), self.project_uav),
-            ("project_preference".to_owned(), self.project_preference),
-            ("project_map".to_owned(), self.project_map),
-            ("project_device".to_owned(), self.project_device),
-        ];
-        for (index, layer) in self.encoder.iter().enumerate() {
-            list.push((format!("encoder.{index}.qkv"), layer.qkv));
-            list.push((format!("encoder.{index}.out"), layer.out));
-            list.push((format!("encoder.{index}.ff1"), layer.ff1));
-            list.push((format!("encoder.{index}.ff2"), layer.ff2));
-        }
-        for (index, layer) in self.head.iter().enumerate() {
-            list.push((format!("head.{index}"), *layer));
-        }
-        list
+    /// The linear layers in the order of the flat vector.
+    pub fn linears(&self) -> impl Iterator<Item = Linear> {
+        let layers = self.encoder.into_iter().flat_map(|layer| [layer.qkv, layer.out, layer.ff1, layer.ff2]);
+        [self.project_uav, self.project_preference, self.project_map, self.project_device]
+            .into_iter()
+            .chain(layers)
+            .chain(self.head)
+    }
+
+    /// The linear layers with their names, in the order of the flat vector.
+    fn named_linears(&self) -> impl Iterator<Item = (String, Linear)> {
+        let projectors = ["uav", "preference", "map", "device"].map(|name| format!("project_{name}"));
+        let layers = (0..LAYERS)
+            .flat_map(|layer| ["qkv", "out", "ff1", "ff2"].map(|name| format!("encoder.{layer}.{name}")));
+        let head = [0, 1].map(|index| format!("head.{index}"));
+        projectors.into_iter().chain(layers).chain(head).zip(self.linears())
     }
 
     fn norms(&self) -> Vec<(String, Norm)> {
@@ -221,7 +232,7 @@ impl Shape {
     pub fn tensors(&self) -> Vec<Tensor> {
         let layout = Layout::new(*self);
         let mut tensors = Vec::new();
-        for (name, linear) in layout.linears() {
+        for (name, linear) in layout.named_linears() {
             let weights = linear.inputs * linear.outputs;
             tensors.push(Tensor {
                 name: format!("{name}.weight"),
@@ -251,7 +262,7 @@ impl Shape {
     pub fn initialise(&self, rng: &mut impl Rng) -> Vec<f32> {
         let layout = Layout::new(*self);
         let mut parameters = vec![0.0; layout.len];
-        for (_, linear) in layout.linears() {
+        for linear in layout.linears() {
             let bound = 1.0 / (linear.inputs as f32).sqrt();
             let (weight, bias) = linear.split_mut(&mut parameters);
             for value in weight.iter_mut().chain(bias) {

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::attention::KEPT;
 use super::batch::Batch;
 use super::lanes::LANES;
+use super::matrix::{CutWeights, Panels};
 use super::shape::{
     DEVICE_FEATURES, FIXED_TOKENS, HEAD_INPUTS, HEADS, LAYERS, MAP_CELLS, PREFERENCE_FEATURES, Shape,
     TOKENS_MAX, UAV_FEATURES, WIDTH,
@@ -130,6 +131,8 @@ impl Activations {
 /// Gradients of activations while they are on their way back through one chunk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
+    pub panels: Panels,
+    pub d_outputs: Vec<f32>,
     pub d_tokens: Vec<f32>,
     pub d_mixed: Vec<f32>,
     pub d_qkv: Vec<f32>,
@@ -138,10 +141,29 @@ pub(super) struct Scratch {
     pub d_head: Vec<f32>,
 }
 
+impl Scratch {
+    /// Makes room for one chunk; what the matrices hold is left over from another.
+    pub fn prepare(&mut self, chunk: &Activations) {
+        let layer = &chunk.layers[0];
+        for (matrix, like) in [
+            (&mut self.d_tokens, &chunk.embedded),
+            (&mut self.d_mixed, &layer.mixed),
+            (&mut self.d_qkv, &layer.qkv),
+            (&mut self.d_hidden, &layer.hidden),
+            (&mut self.d_joined, &chunk.joined),
+            (&mut self.d_head, &chunk.hidden),
+        ] {
+            matrix.resize(like.len(), 0.0);
+        }
+    }
+}
+
 /// All memory that [`super::forward`] and [`super::backward`] need. It grows to the largest batch
 /// seen and is never given back; nothing is allocated once it is large enough.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
+    pub(super) forward_weights: CutWeights,
+    pub(super) backward_weights: CutWeights,
     pub(super) chunks: Vec<Activations>,
     pub(super) scratch: Scratch,
     /// `[samples, outputs]` of the last forward pass.
