@@ -1,0 +1,40 @@
+//! Milliseconds of one update, least of a few rounds, as one line that a script can read. The
+//! command is `python3 host-trainer/scripts/compare_with_pytorch.py`.
+
+mod twin;
+
+use std::time::Instant;
+
+const WARM_UP: usize = 5;
+const ROUNDS: usize = 6;
+const UPDATES_A_ROUND: usize = 20;
+
+/// Milliseconds that this thread has been running, by the kernel's count; it moves on at each
+/// scheduler tick, so rounds must be long. Only Linux tells.
+fn cpu_ms() -> Option<f64> {
+    let line = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let nanoseconds: f64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(nanoseconds * 1e-6)
+}
+
+fn main() {
+    let mut learner = twin::Learner::new();
+    for _ in 0..WARM_UP {
+        learner.update();
+    }
+    let (mut least_cpu, mut least_wall) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..ROUNDS {
+        let (cpu, wall) = (cpu_ms(), Instant::now());
+        for _ in 0..UPDATES_A_ROUND {
+            learner.update();
+        }
+        let each = 1.0 / UPDATES_A_ROUND as f64;
+        least_wall = least_wall.min(wall.elapsed().as_secs_f64() * 1e3 * each);
+        if let (Some(before), Some(after)) = (cpu, cpu_ms()) {
+            least_cpu = least_cpu.min((after - before) * each);
+        }
+    }
+    // Printed so that no part of the work can be left out.
+    let sum: f32 = learner.actor.parameters.iter().sum();
+    println!("gleaner cpu_ms {least_cpu:.2} wall_ms {least_wall:.2} (sum of parameters {sum:.4})");
+}
