@@ -39,6 +39,7 @@
 mod decision;
 mod deliberation;
 mod engagement;
+mod exchange;
 mod flight;
 mod ledger;
 mod leg;
@@ -54,7 +55,8 @@ mod stream;
 mod vehicle;
 
 pub use decision::{Decision, DecisionRecord, RECORD_BYTES_MAX};
-pub use machine::{Inputs, Machine, Notice, Outputs, Request, Telemetry};
+pub use exchange::{Inputs, Notice, Outputs, Request, Telemetry};
+pub use machine::Machine;
 pub use mission::{DeviceSite, MAX_DEVICES, Mission, MissionError};
 pub use onboard::{Onboard, OnboardError, Settings, Stats};
 pub use state::{Fault, Missing, ReturnReason, State};

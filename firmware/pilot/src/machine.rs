@@ -1,98 +1,19 @@
-//! `poll(now, inputs) -> outputs`: what comes in, what goes out, and the dispatch by state.
+//! `poll(now, inputs) -> outputs`: the operator's word, the dispatch by state, and what is told of it.
 
 use crate::flight::{Flight, HandBack};
 use crate::standby::{ShadowWatch, Wait};
-use crate::{Decision, Fault, Mission, MissionError, ReturnReason, State, Vehicle};
-use core::fmt::{self, Write};
+use crate::{
+    Decision, Fault, Inputs, Mission, MissionError, Outputs, Request, ReturnReason, State, Telemetry, Vehicle,
+};
 use gleaner_guard::Guard;
-use gleaner_link::{AutopilotCommand, Firmware, Parameters, Severity, SystemState};
+use gleaner_link::{Firmware, Parameters, Severity, SystemState};
 use gleaner_policy::{DeviceState, Policy, Preference};
-use gleaner_units::{BatteryUnits, Cell, Duration, Instant, Ned};
-use heapless::{String, Vec};
+use gleaner_units::{BatteryUnits, Cell, Duration, Instant};
 
 /// A decision loop that is later than this is no loop any more: PX4 has left OFFBOARD by then
 /// (`COM_OF_LOSS_T` 1 s), and an aircraft at 20 m/s has flown a whole cell unwatched.
 const LATE: Duration = Duration::from_secs(1);
 const TELEMETRY_PERIOD: Duration = Duration::from_secs(1);
-
-/// What the operator asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// `GLN_ENABLE` 0 or `MAV_CMD_USER_2` 0.
-    Off,
-    /// `GLN_ENABLE` 1 or `MAV_CMD_USER_2` 1, also when it was 1 before.
-    Engage,
-    /// `GLN_ENABLE` 2 or `MAV_CMD_USER_2` 2.
-    Shadow,
-    /// `MAV_CMD_USER_3`.
-    Return,
-}
-
-/// What the machine looks at in one poll.
-#[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a> {
-    /// What the autopilot says.
-    pub vehicle: &'a Vehicle,
-    /// The devices of the mission, in its order, with ageing already applied.
-    pub devices: &'a [DeviceState],
-    /// The operator's parameters.
-    pub parameters: &'a Parameters,
-    /// The operator's newest request since the last poll.
-    pub request: Option<Request>,
-    /// Whether any heartbeat since the last poll showed a mode in which someone else steers, even if the last
-    /// one does not.
-    pub other_mode_seen: bool,
-    /// Commands of ours that ended since the last poll, and whether the autopilot accepted them.
-    pub ended: &'a [(AutopilotCommand, bool)],
-}
-
-/// One line for the operator (`STATUSTEXT`).
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Notice {
-    /// How bad.
-    pub severity: Severity,
-    /// At most 50 characters: one message.
-    pub text: String<50>,
-}
-
-/// Once a second, for `NAMED_VALUE_FLOAT`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Telemetry {
-    /// Weight of data.
-    pub w_data: f32,
-    /// Fraction of the initial data that is known to be collected.
-    pub collected: f32,
-    /// Battery beyond the way to the terminal, while it is watched.
-    pub spare: Option<BatteryUnits>,
-    /// The device most attended to in the last decision, as its index in the mission.
-    pub attended: Option<u16>,
-}
-
-/// What the machine wants to be sent.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Outputs {
-    /// Drop every target and command of ours that has not left or is not answered yet. Comes before the rest.
-    pub withdraw: bool,
-    /// Position target; always finite.
-    pub setpoint: Option<Ned>,
-    /// A command for the autopilot; the link repeats it until it is answered.
-    pub command: Option<AutopilotCommand>,
-    /// Lines for the operator.
-    pub notices: Vec<Notice, 6>,
-    /// Whether a decision was made: see [`Machine::decision`].
-    pub decided: bool,
-    /// Once a second.
-    pub telemetry: Option<Telemetry>,
-}
-
-impl Outputs {
-    pub(crate) fn say(&mut self, severity: Severity, text: fmt::Arguments<'_>) {
-        let mut line = String::new();
-        // A line that is too long is cut; a test shows that none of ours is.
-        let _ = line.write_fmt(text);
-        let _ = self.notices.push(Notice { severity, text: line });
-    }
-}
 
 /// A state with what belongs to it.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,7 +82,7 @@ impl Machine {
         self.collected = collected(&self.mission, inputs.devices);
         self.watch_preference(inputs, &mut out);
 
-        let before = self.state();
+        let before = (self.state(), self.landed());
         let mut phase = core::mem::replace(&mut self.phase, Phase::Passive);
         if let Phase::Boot = phase {
             phase = match self.self_test_passed {
@@ -304,13 +225,7 @@ impl Machine {
     }
 
     /// The operator's word comes before everything but the self-test.
-    fn answer(
-        &self,
-        phase: Phase,
-        request: Request,
-        inputs: &Inputs<'_>,
-        out: &mut Outputs,
-    ) -> Phase {
+    fn answer(&self, phase: Phase, request: Request, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
         match (request, phase) {
             (_, Phase::Fault(Fault::SelfTest, none)) => {
                 out.say(Severity::Critical, format_args!("gleaner: refused, self-test failed"));
@@ -361,13 +276,13 @@ impl Machine {
         self.decision = Some(decision);
     }
 
-    fn announce(&mut self, before: State, out: &mut Outputs) {
+    fn announce(&mut self, (before, landed_before): (State, bool), out: &mut Outputs) {
         match &self.phase {
             Phase::Engaged(flight) | Phase::Homing(flight, _) => self.spent = flight.spent(),
             _ => {}
         }
         let state = self.state();
-        if state == before {
+        if (state, self.landed()) == (before, landed_before) {
             return;
         }
         let flies = matches!(state, State::Engaged | State::Homing);

@@ -1,11 +1,8 @@
 //! A machine in virtual time, with an aircraft that flies to the last target in a straight line.
-#![allow(dead_code)]
 
 use gleaner_guard::Guard;
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters};
-use gleaner_pilot::{
-    DeviceSite, Inputs, Machine, Mission, Outputs, Request, State, Vehicle,
-};
+use gleaner_pilot::{DeviceSite, Inputs, Machine, Mission, Outputs, Request, State, Vehicle};
 use gleaner_policy::{Attention, DeviceState, Inference, Policy, Tokens};
 use gleaner_units::{
     Action, BatteryUnits, Cell, CellSet, Duration, GeoPoint, Grid, GridFrame, HeightMap, Instant, Metres, Ned,

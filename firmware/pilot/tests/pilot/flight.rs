@@ -1,0 +1,191 @@
+//! The regular flight: decisions, legs, the ledger, landing, what is told.
+
+use crate::rig::{DOWN_M, Rig, TERMINAL};
+use gleaner_link::{AutopilotCommand, Firmware, FlightMode};
+use gleaner_pilot::{Request, State};
+use gleaner_units::{Action, BatteryUnits, Cell, MetresPerSecond, Ned};
+
+use Action::{East, Hover, North, West};
+
+#[test]
+fn a_mission_flies_cell_by_cell_and_lands_where_a_move_enters_the_terminal() {
+    let mut rig = Rig::engaged();
+    rig.policy.actions = [North, East, Hover, East, East, North, North, East, East].into();
+    rig.run_to(State::Done);
+    let route: Vec<Ned> = rig.setpoints.iter().fold(Vec::new(), |mut route, &(_, target)| {
+        if route.last() != Some(&target) {
+            route.push(target);
+        }
+        route
+    });
+    let cells = [(1, 1), (1, 2), (2, 2), (3, 2), (4, 2), (4, 3), (4, 4), (5, 4), (6, 4)];
+    assert_eq!(route, cells.map(|(x, y)| rig.centre(Cell::new(x, y))));
+    assert_eq!(route[0].down_m, DOWN_M, "above home, not above the origin");
+    assert_eq!(rig.actions, [North, East, Hover, East, East, North, North, East, East]);
+    assert_eq!(rig.machine.spent(), BatteryUnits(8.5));
+    assert_eq!(rig.commanded(AutopilotCommand::Land), 1);
+    assert_eq!(rig.commanded(AutopilotCommand::ChangeSpeed(MetresPerSecond(10.0))), 1);
+    assert!(!rig.machine.landed());
+    let silent_from = rig.setpoints.len();
+    rig.run(5.0);
+    rig.vehicle.armed = false;
+    rig.step();
+    assert!(rig.machine.landed());
+    assert_eq!(rig.state(), State::Done);
+    assert_eq!(rig.setpoints.len(), silent_from);
+    assert_eq!((rig.said("terminal reached"), rig.said("landing")), (1, 1));
+}
+
+#[test]
+fn the_ledger_is_what_the_policy_sees() {
+    let mut rig = Rig::engaged();
+    rig.policy.actions = [North, Hover, East].into();
+    rig.run(12.0);
+    let seen: Vec<[f32; 2]> =
+        rig.policy.asked.iter().take(4).map(|tokens| [tokens.uav[1], tokens.uav[0]]).collect();
+    // Budget 30 (90 % of 100 would be more); spare = battery - distance to (6, 4).
+    assert_eq!(seen, [[30.0, 22.0], [29.0, 22.0], [28.5, 21.5], [27.5, 21.5]]);
+    rig.vehicle.battery_percent = Some(20);
+    let asked = rig.policy.asked.len();
+    rig.run(3.0);
+    assert_eq!(rig.policy.asked[asked].uav[1], 21.0, "capped by percent + 1");
+}
+
+#[test]
+fn a_hover_lasts_one_slot_and_a_move_as_long_as_it_takes() {
+    let mut rig = Rig::engaged();
+    rig.set("GLN_SPEED", 5.0);
+    let mut decided = Vec::new();
+    while decided.len() < 4 {
+        if rig.step().decided {
+            decided.push(rig.now.as_millis());
+        }
+    }
+    assert!(decided.windows(2).all(|pair| pair[1] - pair[0] == 4_000), "20 m at 5 m/s: {decided:?}");
+}
+
+#[test]
+fn a_mission_that_starts_on_its_terminal_goes_out_and_back() {
+    let mut rig = Rig::new();
+    rig.place(TERMINAL, 1.0);
+    rig.engage();
+    rig.policy.actions = [Hover, Hover, West, East].into();
+    rig.run_to(State::Done);
+    assert_eq!(rig.actions, [Hover, Hover, West, East]);
+    assert_eq!(rig.machine.spent(), BatteryUnits(3.0));
+}
+
+#[test]
+fn whatever_the_policy_wants_the_guard_brings_it_home() {
+    for then in Action::ALL {
+        let mut rig = Rig::engaged();
+        rig.policy.then = then;
+        rig.run_to(State::Done);
+        assert!(rig.machine.spent() <= BatteryUnits(28.0), "{then:?} leaves the reserve of 2");
+        assert!(rig.vehicle.position.unwrap().horizontal_distance(&rig.centre(TERMINAL)).0 < 2.0);
+    }
+}
+
+#[test]
+fn the_preference_changes_at_the_next_decision_and_not_before() {
+    let mut rig = Rig::engaged();
+    rig.set("GLN_SPEED", 2.0);
+    rig.run(1.0);
+    assert_eq!(rig.policy.asked.len(), 1);
+    rig.set("GLN_W_DATA", 0.25);
+    rig.run(5.0);
+    assert_eq!(rig.policy.asked.len(), 1, "a slot of ten seconds is not cut short");
+    rig.run(5.0);
+    let seen: Vec<[f32; 2]> = rig.policy.asked.iter().map(|tokens| tokens.preference).collect();
+    assert_eq!(seen, [[0.5, 0.5], [0.25, 0.75]]);
+    assert_eq!(rig.said("preference w_data 0.25"), 1);
+    assert_eq!(rig.machine.preference_changes(), 1);
+}
+
+#[test]
+fn a_changed_speed_is_asked_for_again_on_ardupilot_only() {
+    for (firmware, asked) in [(Firmware::ArduPilot, 1), (Firmware::Px4, 0)] {
+        let mut rig = Rig::new();
+        rig.vehicle.firmware = Some(firmware);
+        rig.engage();
+        rig.run(1.0);
+        rig.set("GLN_SPEED", 6.0);
+        rig.run(5.0);
+        assert_eq!(rig.commanded(AutopilotCommand::ChangeSpeed(MetresPerSecond(6.0))), asked);
+    }
+}
+
+#[test]
+fn a_return_on_the_terminal_lands_there() {
+    let mut rig = Rig::new();
+    rig.place(TERMINAL, 1.0);
+    rig.engage();
+    rig.run(3.0);
+    rig.request = Some(Request::Return);
+    rig.run_to(State::Done);
+    assert!(rig.actions.iter().all(|&action| action == Hover));
+}
+
+#[test]
+fn a_landing_that_only_the_mode_confirms_is_a_landing() {
+    let mut rig = Rig::new();
+    rig.vehicle.firmware = Some(Firmware::Px4);
+    rig.place(TERMINAL, 0.0);
+    rig.engage();
+    rig.accepts = None;
+    rig.request = Some(Request::Return);
+    while rig.commanded(AutopilotCommand::Land) == 0 {
+        rig.step();
+    }
+    let before = rig.setpoints.len();
+    rig.run(1.0);
+    assert_eq!(rig.state(), State::Homing);
+    assert!(rig.setpoints.len() > before + 9, "OFFBOARD is kept alive until it lands");
+    rig.vehicle.mode = Some(FlightMode::Land);
+    rig.step();
+    assert_eq!((rig.state(), rig.machine.landed()), (State::Done, false));
+    rig.vehicle.on_ground = true;
+    rig.step();
+    assert!(rig.machine.landed());
+}
+
+#[test]
+fn ardupilot_gets_targets_on_change_and_once_a_second() {
+    let mut rig = Rig::engaged();
+    rig.set("GLN_SPEED", 1.0);
+    rig.run(15.0);
+    assert!(rig.setpoints.windows(2).all(|pair| {
+        let gap_ms = pair[1].0 - pair[0].0;
+        gap_ms == 1_000 || (gap_ms < 1_000 && pair[0].1 != pair[1].1)
+    }));
+    assert!(rig.setpoints.len() <= 17);
+}
+
+#[test]
+fn telemetry_comes_once_a_second() {
+    let mut rig = Rig::engaged();
+    rig.devices[0].remaining = 2_000.0;
+    let mut told = Vec::new();
+    for _ in 0..100 {
+        told.extend(rig.step().telemetry);
+    }
+    assert_eq!(told.len(), 5);
+    assert_eq!(told[4].collected, 0.5);
+    assert_eq!(told[4].spare, Some(BatteryUnits(28.5 - 8.0)), "three hovers paid");
+}
+
+#[test]
+fn a_decision_record_fits_a_tunnel_and_comes_back() {
+    use gleaner_pilot::{DecisionRecord, RECORD_BYTES_MAX};
+    let mut rig = Rig::engaged();
+    rig.run(1.0);
+    let mut record = rig.machine.decision().unwrap().record();
+    record.sequence = u32::MAX;
+    record.time_ms = u32::MAX;
+    record.cell = Cell::new(i16::MIN, i16::MAX);
+    record.attended = Some(u16::MAX);
+    let mut buffer = [0; RECORD_BYTES_MAX];
+    let bytes = record.encode(&mut buffer).expect("the longest record fits");
+    assert_eq!(DecisionRecord::decode(bytes), Some(record));
+    assert_eq!(DecisionRecord::decode(&bytes[..bytes.len() - 1]), None);
+}

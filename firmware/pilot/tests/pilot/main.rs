@@ -1,0 +1,12 @@
+//! The pilot from outside, in virtual time.
+
+mod flight;
+mod invariants;
+mod mission;
+#[cfg(feature = "std")]
+mod mission_file;
+mod onboard;
+mod rig;
+mod start;
+mod take_over;
+mod trouble;

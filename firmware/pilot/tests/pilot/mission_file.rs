@@ -1,0 +1,108 @@
+//! Mission files, read and written.
+
+use gleaner_pilot::DeviceSite;
+use gleaner_pilot::mission_file::{read, write};
+use gleaner_units::{Cell, GeoPoint};
+
+const TEXT: &str = r#"terminal = [2, 1]
+battery_units = 20.0
+
+[grid]
+corner_lat_deg = -35.3632621
+corner_lon_deg = 149.1652374
+cell_m = 20.0
+heights = "city.csv"
+
+[fence]
+excluded = [[3, 0]]
+
+[[device]]
+id = 7
+cell = [1, 1]
+data = 6000.0
+
+[[device]]
+id = 9
+lat_deg = -35.36317
+lon_deg = 149.16568
+data = 100.0
+"#;
+
+fn city(path: &str) -> Result<String, String> {
+    assert_eq!(path, "city.csv");
+    Ok("0,10,20,30\n1,2,3,4\n".into())
+}
+
+fn fails(text: &str) -> String {
+    let error = read(text, city).unwrap_err().to_string();
+    assert!(!error.contains('\n'), "one line: {error}");
+    error
+}
+
+#[test]
+fn a_mission_survives_writing_and_reading() {
+    let mission = read(TEXT, city).unwrap();
+    assert_eq!(mission.terminal, Cell::new(2, 1));
+    assert_eq!(mission.corner, GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 });
+    assert_eq!(mission.heights.height_m(Cell::new(0, 0)), Some(1));
+    assert_eq!(mission.fence.len(), 7);
+    assert_eq!(mission.devices[0], DeviceSite { id: 7, cell: Cell::new(1, 1), data: 6000.0 });
+    assert_eq!(mission.devices[1].cell, Cell::new(2, 0), "from latitude and longitude");
+    let text = write(&mission, "city.csv");
+    assert_eq!(read(&text, city).unwrap(), mission, "{text}");
+}
+
+#[test]
+fn faults_name_the_line_and_say_what_to_do() {
+    assert_eq!(
+        fails(&TEXT.replace("id = 9", "id = 7")),
+        "line 18: two devices have the id 7: correct this device"
+    );
+    assert_eq!(
+        fails(&TEXT.replace("cell = [1, 1]", "cell = [9, 1]")),
+        "line 13: device 7 stands outside the city: correct this device"
+    );
+    assert_eq!(
+        fails(&TEXT.replace("cell = [1, 1]\n", "")),
+        "line 13: device 7: give either cell = [x, y] or lat_deg and lon_deg"
+    );
+    assert_eq!(
+        fails(&TEXT.replace("[2, 1]", "[3, 0]")),
+        "line 1: the terminal cell is outside the fence: move the terminal or widen the fence"
+    );
+    assert_eq!(
+        fails(&TEXT.replace("20.0\n\n[grid]", "nan\n\n[grid]")),
+        "line 2: battery_units is not a number above 0: give one"
+    );
+    assert_eq!(fails(&TEXT.replace("-35.3632621", "nan")), "line 5: not an angle from -90 to 90 degrees");
+    assert_eq!(
+        fails(&TEXT.replace("cell_m = 20.0", "cell_m = -1.0")),
+        "line 7: cell_m is not a length above 0: give the side in metres"
+    );
+    assert_eq!(
+        fails(&TEXT.replace("[[3, 0]]", "[[4, 0]]")),
+        "line 11: cell (4, 0) is outside the 4 x 2 grid"
+    );
+    assert!(fails(&TEXT.replace("cell_m", "cell_metres")).starts_with("line 7: unknown field `cell_metres`"));
+    assert!(fails("terminal = [1").starts_with("line 1: "));
+    assert!(fails(&TEXT.replace("data = 6000.0\n", "")).starts_with("line 13: missing field `data`"));
+}
+
+#[test]
+fn the_city_is_asked_for_by_its_path_and_its_faults_are_passed_on() {
+    let missing = read(TEXT, |_| Err("no such file".into())).unwrap_err();
+    assert_eq!(missing.to_string(), "line 8: heights \"city.csv\": no such file");
+    let wrong = read(TEXT, |_| Ok("1,x\n".into())).unwrap_err();
+    assert_eq!(
+        wrong.to_string(),
+        "heights \"city.csv\", line 1, value 2: not a whole number of metres from 0 to 255"
+    );
+}
+
+#[test]
+fn without_a_fence_all_of_the_grid_may_be_flown_over() {
+    let text = TEXT.replace("[fence]\nexcluded = [[3, 0]]\n", "");
+    assert_eq!(read(&text, city).unwrap().fence.len(), 8);
+    let rectangle = TEXT.replace("excluded = [[3, 0]]", "allowed = [[1, 0], [2, 1]]");
+    assert_eq!(read(&rectangle, city).unwrap().fence.len(), 4);
+}
