@@ -1,0 +1,108 @@
+//! Python, for the checks that only other people's programs can make.
+//!
+//! The programs live in a virtual environment in the build folder, made once from `tests/python/requirements.txt`
+//! and made anew when a version in that file is not the one installed. A machine without Python fails the test
+//! that asked: nothing is skipped.
+
+use anyhow::{Context, Result, bail};
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Folder of the scripts and of the requirements.
+#[must_use]
+pub fn scripts() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("python")
+}
+
+/// Runs one of our scripts in the virtual environment; gives its standard output.
+///
+/// # Errors
+/// No environment (the message says what to type), or the script ended with another code than 0.
+pub fn run<A: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = A>) -> Result<String> {
+    let output = Command::new(interpreter()?)
+        .arg(scripts().join(script))
+        .args(arguments)
+        .output()
+        .with_context(|| format!("cannot start {script}"))?;
+    if !output.status.success() {
+        bail!("{script} ended with {}:\n{}", output.status, String::from_utf8_lossy(&output.stderr));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// The Python of the virtual environment, which has everything in the requirements. Tests and processes may ask
+/// at the same time; one makes the environment, the others wait.
+///
+/// # Errors
+/// There is no `python3` on the PATH, or it cannot install: with the line that mends it.
+pub fn interpreter() -> Result<PathBuf> {
+    let target = target_folder();
+    fs::create_dir_all(&target)?;
+    let lock = File::create(target.join("venv.lock"))?;
+    lock.lock().context("cannot lock the virtual environment")?;
+    let environment = target.join("venv");
+    let python = environment.join("bin/python");
+    let requirements = scripts().join("requirements.txt");
+    if !is_complete(&python, &requirements) {
+        make(&environment, &python, &requirements)?;
+    }
+    Ok(python)
+    // Dropping the file releases the lock.
+}
+
+/// Where cargo builds; relative paths count from the workspace's folder.
+fn target_folder() -> PathBuf {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    workspace.join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// Whether exactly the pinned versions are installed, however they came there.
+fn is_complete(python: &Path, requirements: &Path) -> bool {
+    const COMPARE: &str = "
+import importlib.metadata, sys
+for line in open(sys.argv[1]):
+    pin = line.split('#')[0].strip()
+    if pin:
+        name, version = pin.split('==')
+        if importlib.metadata.version(name) != version:
+            sys.exit(1)
+";
+    python.exists()
+        && Command::new(python)
+            .args(["-c", COMPARE])
+            .arg(requirements)
+            .output()
+            .is_ok_and(|output| output.status.success())
+}
+
+fn make(environment: &Path, python: &Path, requirements: &Path) -> Result<()> {
+    let advice = format!(
+        "python3 -m venv --clear {} && {} -m pip install -r {}",
+        environment.display(),
+        python.display(),
+        requirements.display()
+    );
+    let made = Command::new("python3").args(["-m", "venv", "--clear"]).arg(environment).output();
+    let made = made.with_context(|| {
+        format!(
+            "cannot start python3: install Python 3.11 or newer with its venv module, then type: {advice}"
+        )
+    })?;
+    succeeded("python3 -m venv", &made, &advice)?;
+    let installed = Command::new(python)
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"])
+        .arg(requirements)
+        .output()
+        .with_context(|| format!("cannot start {}: type: {advice}", python.display()))?;
+    succeeded("pip install", &installed, &advice)
+}
+
+fn succeeded(what: &str, output: &Output, advice: &str) -> Result<()> {
+    if !output.status.success() {
+        let said = [&output.stdout[..], &output.stderr[..]].concat();
+        bail!("{what} failed: {}\ntype: {advice}", String::from_utf8_lossy(&said).trim());
+    }
+    Ok(())
+}
