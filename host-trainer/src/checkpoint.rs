@@ -1,0 +1,117 @@
+//! A file that survives a kill: written beside the last good one, renamed over it when it is whole.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// First bytes of a checkpoint: name and version of the format.
+const MAGIC: &[u8; 8] = b"GLNCKPT1";
+/// CRC-32 as in IEEE 802.3, over the payload.
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// Why a checkpoint cannot be used.
+#[derive(Debug, Error)]
+pub enum CheckpointError {
+    /// The file system's own reason. The last good checkpoint, if there is one, is untouched.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// Not a checkpoint of this program.
+    #[error("{}: not a checkpoint of this version; train into another --out folder", path.display())]
+    Format {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// The content is not what was written.
+    #[error("{}: truncated or damaged; delete it and resume from the copy of it that you keep, or start anew", path.display())]
+    Damaged {
+        /// Which file.
+        path: PathBuf,
+    },
+}
+
+/// Writes `value` so that `path` is at every moment either the old checkpoint or the new one.
+///
+/// # Errors
+/// A full disk, mostly. The old checkpoint is then still there.
+pub fn save<T: Serialize>(path: &Path, value: &T) -> Result<(), CheckpointError> {
+    let io = |source| CheckpointError::Io { path: path.to_owned(), source };
+    let payload = postcard::to_stdvec(value).map_err(|error| io(io::Error::other(error)))?;
+    let temporary = path.with_extension("writing");
+    let write = || -> io::Result<()> {
+        let mut file = File::create(&temporary)?;
+        file.write_all(MAGIC)?;
+        file.write_all(&(payload.len() as u64).to_le_bytes())?;
+        file.write_all(&CRC.checksum(&payload).to_le_bytes())?;
+        file.write_all(&payload)?;
+        // On the disk before the name points to it.
+        file.sync_all()?;
+        fs::rename(&temporary, path)
+    };
+    write().map_err(|error| {
+        let _ = fs::remove_file(&temporary);
+        io(error)
+    })
+}
+
+/// Reads a checkpoint back.
+///
+/// # Errors
+/// See [`CheckpointError`].
+pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CheckpointError> {
+    let io = |source| CheckpointError::Io { path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    File::open(path).map_err(io)?.read_to_end(&mut bytes).map_err(io)?;
+    let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| CheckpointError::Format { path: path.to_owned() })?;
+    let damaged = || CheckpointError::Damaged { path: path.to_owned() };
+    let (len, rest) = rest.split_first_chunk::<8>().ok_or_else(damaged)?;
+    let (crc, payload) = rest.split_first_chunk::<4>().ok_or_else(damaged)?;
+    let whole =
+        u64::from_le_bytes(*len) == payload.len() as u64 && u32::from_le_bytes(*crc) == CRC.checksum(payload);
+    if !whole {
+        return Err(damaged());
+    }
+    postcard::from_bytes(payload).map_err(|_| CheckpointError::Format { path: path.to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_checkpoint_comes_back_and_damage_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.checkpoint");
+        let value: Vec<f32> = (0..1000).map(|i| i as f32 * 0.25).collect();
+        save(&path, &value).unwrap();
+        assert_eq!(load::<Vec<f32>>(&path).unwrap(), value);
+
+        let good = fs::read(&path).unwrap();
+        for cut in [0, 7, 8, 15, 19, 20, good.len() / 2, good.len() - 1] {
+            fs::write(&path, &good[..cut]).unwrap();
+            assert!(load::<Vec<f32>>(&path).is_err(), "cut at {cut}");
+        }
+        let mut flipped = good.clone();
+        flipped[500] ^= 1;
+        fs::write(&path, &flipped).unwrap();
+        assert!(matches!(load::<Vec<f32>>(&path), Err(CheckpointError::Damaged { .. })));
+    }
+
+    #[test]
+    fn a_write_that_fails_leaves_the_old_checkpoint() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.checkpoint");
+        save(&path, &1u32).unwrap();
+        // A folder in the way of the temporary file stands for a disk that cannot be written.
+        fs::create_dir(path.with_extension("writing")).unwrap();
+        assert!(matches!(save(&path, &2u32), Err(CheckpointError::Io { .. })));
+        assert_eq!(load::<u32>(&path).unwrap(), 1);
+    }
+}

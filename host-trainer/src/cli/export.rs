@@ -1,0 +1,214 @@
+//! `gleaner-train export`.
+
+use super::evaluate::render;
+use anyhow::{Context, Result, bail};
+use gleaner_host_trainer::evaluation::{Engine, Table, evaluate, evaluate_greedy, realizations};
+use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
+use gleaner_host_trainer::flight::Flight;
+use gleaner_host_trainer::net::Shape;
+use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::train::{Trained, trained};
+use gleaner_policy::Tokens;
+use gleaner_policy::onnx::TractPolicy;
+use gleaner_units::BatteryUnits;
+use gleaner_world::{ScenarioKind, World};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+
+/// The settings in which a card is measured, K and B: the paper's.
+const MEASURED: [(usize, u16); 5] = [(3, 80), (5, 80), (6, 80), (9, 80), (10, 100)];
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The folder of the run.
+    #[arg(long)]
+    run: PathBuf,
+    /// The model to write; its card is written beside it with the extension `md`.
+    #[arg(long)]
+    model: PathBuf,
+    /// What people call it.
+    #[arg(long, default_value = "gleaner")]
+    name: String,
+    /// The commit that trained it; asked of git when not given.
+    #[arg(long)]
+    commit: Option<String>,
+    /// Evaluation realizations per setting in the card.
+    #[arg(long, default_value_t = 100)]
+    realizations: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.realizations == 0 {
+        bail!("--realizations 0: a card without measurements is no card; give at least 1");
+    }
+    let trained = trained(&arguments.run)?;
+    let world = Arc::new(World::default_world());
+    let commit = match &arguments.commit {
+        Some(commit) => commit.clone(),
+        None => head_commit().context("no git here to name the commit; give --commit")?,
+    };
+    let card = ModelCard {
+        name: arguments.name.clone(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        commit,
+        command: train_command(&trained.settings),
+        seed: trained.settings.seed,
+        steps: trained.best.steps,
+        scenario: scenario_name(&trained.settings),
+        city_hash: world.city().fingerprint(),
+    };
+    let (shape, actor) = (Shape::actor(), &trained.best.actor);
+    let goldens = golden_pairs(actor, shape, &golden_observations(&world)?);
+    let bytes = export(actor, shape, &card, &goldens)?;
+    // What is shipped is what is measured: the written bytes, in the engine that flies them.
+    let mut policy = TractPolicy::load_checked(&bytes).context("the exported model fails its own test")?;
+    let text = card_text(&card, &trained, &mut policy, &world, arguments)?;
+    write_whole(&arguments.model, &bytes)?;
+    let card_path = arguments.model.with_extension("md");
+    write_whole(&card_path, text.as_bytes())?;
+    println!("wrote {} and {}", arguments.model.display(), card_path.display());
+    Ok(())
+}
+
+/// Loads a model and tests it with its golden pairs.
+pub fn load_model(path: &Path) -> Result<TractPolicy> {
+    let bytes = fs::read(path).with_context(|| format!("{}", path.display()))?;
+    TractPolicy::load_checked(&bytes).with_context(|| format!("{}", path.display()))
+}
+
+/// States from the first, a middle and a late slot of flights with few, usual and many devices.
+fn golden_observations(world: &Arc<World>) -> Result<Vec<Tokens>> {
+    let mut observations = Vec::new();
+    for (index, devices) in [1, 6, 12].into_iter().enumerate() {
+        let scenario = ScenarioKind::ALL[index % 2].scenario().with_devices(devices);
+        let drawn = realizations(world, &scenario, 1)?;
+        for (preference, slots) in [(1.0, 0), (0.5, 20), (0.0, 1)] {
+            let preference = gleaner_policy::Preference::new(preference).context("a preference")?;
+            let mut flight = Flight::new(world, &drawn[0].1, drawn[0].0, preference)?;
+            let mut greedy = gleaner_host_trainer::greedy::Greedy::new(devices);
+            for _ in 0..slots {
+                flight.step(greedy.decide(&flight));
+            }
+            observations.push(flight.tokens());
+        }
+    }
+    Ok(observations)
+}
+
+fn card_text(
+    card: &ModelCard,
+    trained: &Trained,
+    policy: &mut TractPolicy,
+    world: &Arc<World>,
+    arguments: &Arguments,
+) -> Result<String> {
+    let mut text = format!("# Model card: {}\n\n", card.name);
+    writeln!(text, "| | |\n|---|---|")?;
+    writeln!(text, "| file | `{}` |", arguments.model.file_name().unwrap_or_default().display())?;
+    writeln!(text, "| SHA-256 of the content | `{}` |", policy.info().sha256)?;
+    writeln!(text, "| parameters | {} |", policy.info().parameters)?;
+    writeln!(text, "| schema hash | `{:#018x}` |", policy.info().schema_hash)?;
+    writeln!(text, "| trained with | `{}` |", card.command)?;
+    writeln!(text, "| commit | `{}` |", card.commit)?;
+    writeln!(text, "| seed | {} |", card.seed)?;
+    writeln!(
+        text,
+        "| steps | {} slots flown, {} updates: the best of {} updates by mean hypervolume on 60 validation \
+         realizations |",
+        card.steps, trained.best.update, trained.update
+    )?;
+    writeln!(text, "| trained in | {} |", card.scenario)?;
+    writeln!(text, "| city hash | `{:#018x}` |", card.city_hash)?;
+    writeln!(text, "| golden pairs | {}, in the file |", policy.goldens().len())?;
+    writeln!(
+        text,
+        "\nMeasured on {} evaluation realizations that were neither trained on nor used to choose parameters, in \
+         the default city, with the exported file in tract; GREEDY on the same realizations. Reproduce one \
+         setting with\n\n```sh\ncargo run --release -p gleaner-host-trainer -- evaluate --model {} --scenario \
+         rd --devices 6 --battery 80\n```",
+        arguments.realizations,
+        arguments.model.display()
+    )?;
+    let mut summary = String::from(
+        "\n| scenario | K | B | data % at w = (1, 0) | GREEDY | energy at w = (0, 1) | hypervolume | GREEDY |\n\
+         |---|---|---|---|---|---|---|---|\n",
+    );
+    let mut details = String::new();
+    for kind in ScenarioKind::ALL {
+        for (devices, battery) in MEASURED {
+            let scenario =
+                kind.scenario().with_devices(devices).with_battery(BatteryUnits(f32::from(battery)));
+            let drawn = realizations(world, &scenario, arguments.realizations)?;
+            let greedy = evaluate_greedy(world, &drawn);
+            let table = evaluate(world, &drawn, &mut Engine(policy))?;
+            writeln!(summary, "{}", summary_row(kind, devices, battery, &table, &greedy))?;
+            if devices == 6 {
+                writeln!(details, "\n## {kind}, K = 6, B = 80\n\n{}", render(&table))?;
+            }
+        }
+    }
+    Ok(text + &summary + &details)
+}
+
+fn summary_row(kind: ScenarioKind, devices: usize, battery: u16, table: &Table, greedy: &Table) -> String {
+    let energy = table.rows.first().map_or((0.0, 0.0), |row| (row.energy, row.energy_std));
+    format!(
+        "| {} | {devices} | {battery} | {:.1} | {:.1} | {:.2} ± {:.2} | {:.0} | {:.0} |",
+        kind.name(),
+        table.coverage(),
+        greedy.coverage(),
+        energy.0,
+        energy.1,
+        table.hypervolume,
+        greedy.hypervolume
+    )
+}
+
+fn scenario_name(settings: &Settings) -> String {
+    format!(
+        "default city; RD {:.0} %, RB {:.0} %, other zones {:.0} % of the missions; {:.0} % of them with 1 to 12 \
+         devices and 50 to 120 battery units, the others K = 6, B = 80",
+        100.0 * settings.share_rd,
+        100.0 * settings.share_rb,
+        100.0 * (1.0 - settings.share_rd - settings.share_rb),
+        100.0 * settings.share_varied
+    )
+}
+
+/// The command that trains it again: every setting that is not at its default.
+fn train_command(settings: &Settings) -> String {
+    use clap::Args as _;
+    let mut command = String::from("gleaner-train train --out RUN");
+    let all = serde_json::to_value(settings).unwrap_or_default();
+    let described = Settings::augment_args(clap::Command::new("train"));
+    for argument in described.get_arguments() {
+        let (Some(flag), Some(value)) = (argument.get_long(), all.get(argument.get_id().as_str())) else {
+            continue;
+        };
+        // Settings are f32 and f64: the shortest text that reads back the same is what was typed.
+        let value = value.as_f64().map_or_else(|| value.to_string(), |number| format!("{}", number as f32));
+        let default = argument.get_default_values().first().and_then(|value| value.to_str()).unwrap_or("");
+        if default.parse::<f32>().ok() != value.parse::<f32>().ok() {
+            let _ = write!(command, " --{flag} {value}");
+        }
+    }
+    command
+}
+
+fn head_commit() -> Result<String> {
+    let output = Command::new("git").args(["rev-parse", "HEAD"]).output()?;
+    if !output.status.success() {
+        bail!("git rev-parse HEAD failed");
+    }
+    Ok(String::from_utf8(output.stdout)?.trim().to_owned())
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let temporary = path.with_extension("writing");
+    fs::write(&temporary, bytes)
+        .and_then(|()| fs::rename(&temporary, path))
+        .with_context(|| format!("{}", path.display()))
+}

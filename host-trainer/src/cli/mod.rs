@@ -1,0 +1,34 @@
+//! The command line: parsing validates, the commands do.
+
+mod evaluate;
+mod export;
+mod train;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+/// Learns, evaluates and exports policies for Gleaner.
+#[derive(Debug, Parser)]
+#[command(name = "gleaner-train", version)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Train a policy; goes on from the last checkpoint in --out if there is one.
+    Train(train::Arguments),
+    /// Print the paper's metrics of a model, a checkpoint and GREEDY.
+    Evaluate(evaluate::Arguments),
+    /// Write the best parameters of a run as an ONNX model with its card.
+    Export(export::Arguments),
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    match &arguments.command {
+        Command::Train(arguments) => train::run(arguments),
+        Command::Evaluate(arguments) => evaluate::run(arguments),
+        Command::Export(arguments) => export::run(arguments),
+    }
+}

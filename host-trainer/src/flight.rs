@@ -1,0 +1,119 @@
+//! A mission on the grid with the guard on: what the learner flies.
+
+use crate::observation::Observation;
+use gleaner_guard::Guard;
+use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
+use gleaner_units::{Action, ActionMask, BatteryUnits, CellSet};
+use gleaner_world::{Episode, Realization, ScenarioError, Seed, World};
+use std::sync::Arc;
+
+/// The data that one slot brings, in percent of all there was, and minus its energy in battery units: the
+/// vector reward (paper, eq. 14), in the units of the paper's figures.
+pub type Reward = [f32; 2];
+
+/// An episode that only takes actions inside the envelope, under one preference.
+#[derive(Clone, Debug)]
+pub struct Flight {
+    episode: Episode,
+    guard: Guard,
+    preference: Preference,
+    total: Reward,
+}
+
+impl Flight {
+    /// Starts a mission, with no reserve: the paper's safety controller.
+    ///
+    /// # Errors
+    /// The realization does not belong to this world.
+    ///
+    /// # Panics
+    /// When the terminal has no neighbour inside the map; scenarios have.
+    pub fn new(
+        world: &Arc<World>,
+        realization: &Realization,
+        seed: Seed,
+        preference: Preference,
+    ) -> Result<Flight, ScenarioError> {
+        let episode = Episode::new(Arc::clone(world), realization, seed)?;
+        let map = CellSet::full(world.city().grid());
+        let guard = Guard::new(&map, realization.terminal(), BatteryUnits(0.0))
+            .expect("the terminal of a scenario lies inside a map of more than one cell");
+        Ok(Flight { episode, guard, preference, total: [0.0; 2] })
+    }
+
+    /// What the policy sees now.
+    #[must_use]
+    pub fn tokens(&self) -> Tokens {
+        let (cell, battery) = (self.episode.uav(), self.episode.battery());
+        let situation = Situation {
+            cell,
+            battery,
+            spare: self.guard.spare(cell, battery).unwrap_or(battery),
+            terminal: self.episode.terminal(),
+            preference: self.preference,
+            heights: self.episode.world().city().heights(),
+        };
+        let devices = self.episode.devices().iter().map(|device| DeviceState {
+            cell: device.cell,
+            remaining: device.remaining_units,
+            snr: Some(device.snr),
+        });
+        Tokens::build(&situation, devices).0
+    }
+
+    /// The same for the replay memory.
+    #[must_use]
+    pub fn observe(&self) -> Observation {
+        Observation::new(&self.tokens())
+    }
+
+    /// What the guard allows now.
+    #[must_use]
+    pub fn mask(&self) -> ActionMask {
+        self.guard.mask(self.episode.uav(), self.episode.battery())
+    }
+
+    /// Flies one slot.
+    ///
+    /// # Panics
+    /// On an action outside [`Flight::mask`], or when the flight is over.
+    pub fn step(&mut self, action: Action) -> Reward {
+        assert!(self.mask().allows(action), "{action:?} is outside the envelope");
+        let step = self.episode.step(action).expect("what the guard allows can be flown");
+        let reward = self.episode.reward(&step);
+        for (total, part) in self.total.iter_mut().zip(reward) {
+            *total += part;
+        }
+        reward
+    }
+
+    /// Whether the terminal was reached.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.episode.is_done()
+    }
+
+    /// The sum of the rewards so far: percent of data, minus battery units.
+    #[must_use]
+    pub const fn total(&self) -> Reward {
+        self.total
+    }
+
+    /// The preference that it is flown under.
+    #[must_use]
+    pub const fn preference(&self) -> Preference {
+        self.preference
+    }
+
+    /// The episode underneath.
+    #[must_use]
+    pub const fn episode(&self) -> &Episode {
+        &self.episode
+    }
+
+    /// The envelope.
+    #[must_use]
+    pub const fn guard(&self) -> &Guard {
+        &self.guard
+    }
+}

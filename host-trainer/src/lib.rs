@@ -1,0 +1,28 @@
+//! Learns, evaluates and exports policies: multi-objective soft actor-critic with the attention network
+//! (MOSAC-ATT, `paper`, section IV).
+//!
+//! # Glossary
+//! - **flight**: an episode of the world with the guard on, under one preference.
+//! - **reward**: percent of the data and minus battery units, always as a vector.
+//! - **update**: one gradient step of all networks on one batch; **step**: one slot of one flight.
+//! - **temperature**: two of them, as in the paper: nu weighs the entropy in the objectives, tau heats the softmax
+//!   that explores.
+//! - **realization**: devices drawn for a scenario; evaluation realizations are never trained on.
+//!
+//! # How it hangs together
+//! `train` reads top to bottom; what it calls lives beside it: [`flight`] and [`observation`] make samples,
+//! [`replay`] keeps them, [`mosac`] learns from them, [`evaluation`] judges, [`checkpoint`] survives a kill,
+//! [`export`] writes the model. The network itself is [`net`].
+
+pub mod checkpoint;
+pub mod evaluation;
+pub mod export;
+pub mod flight;
+pub mod greedy;
+pub mod mosac;
+pub mod net;
+pub mod observation;
+pub mod pareto;
+pub mod replay;
+pub mod settings;
+pub mod train;

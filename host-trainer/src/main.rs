@@ -1,0 +1,16 @@
+//! `gleaner-train`: learns, evaluates and exports policies.
+
+mod cli;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match cli::run(&cli::Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("gleaner-train: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}

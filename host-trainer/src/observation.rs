@@ -1,0 +1,84 @@
+//! From the tokens that fly to the numbers that the network's first layer sees.
+
+use crate::net::{DeviceFeatures, Sample};
+use gleaner_policy::schema::{self, Normalisation};
+use gleaner_policy::{LOCAL_MAP_CELLS, Preference, Tokens};
+use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
+
+/// What the replay memory keeps of a state: everything but the preference, small enough to keep 100,000 of
+/// them. Normalised, except for the map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Observation {
+    uav: [f32; 4],
+    /// Building heights, m. On board they are whole metres too.
+    local_map_m: Vec<u8>,
+    devices: Vec<DeviceFeatures>,
+}
+
+struct Normalisations {
+    uav: [Normalisation; 4],
+    device: [Normalisation; 5],
+    height: Normalisation,
+}
+
+static NORMALISATIONS: LazyLock<Normalisations> = LazyLock::new(|| {
+    let of = |tensor: &str| schema::normalisations(tensor).collect::<Vec<_>>();
+    let matches = "the schema has 4 numbers for the aircraft and 5 for a device";
+    Normalisations {
+        uav: of("uav").try_into().expect(matches),
+        device: of("devices").try_into().expect(matches),
+        height: of("local_map")[0],
+    }
+});
+
+impl Observation {
+    /// Normalises tokens and forgets their preference.
+    #[must_use]
+    pub fn new(tokens: &Tokens) -> Observation {
+        let scales = &*NORMALISATIONS;
+        let apply = |(physical, scale): (&f32, &Normalisation)| scale.apply(*physical);
+        let mut uav = [0.0; 4];
+        for (normal, pair) in uav.iter_mut().zip(tokens.uav.iter().zip(&scales.uav)) {
+            *normal = apply(pair);
+        }
+        let devices = tokens
+            .devices
+            .iter()
+            .map(|device| {
+                let mut normal = [0.0; 5];
+                for (normal, pair) in normal.iter_mut().zip(device.iter().zip(&scales.device)) {
+                    *normal = apply(pair);
+                }
+                normal
+            })
+            .collect();
+        Observation { uav, local_map_m: tokens.local_map.iter().map(|&m| m as u8).collect(), devices }
+    }
+
+    /// The network's input for this state under a preference.
+    #[must_use]
+    pub fn with(&self, preference: Preference) -> Sample {
+        let mut sample = Sample {
+            uav: self.uav,
+            preference: [preference.w_data(), preference.w_energy()],
+            device_count: self.devices.len() as u8,
+            ..Sample::default()
+        };
+        let height = NORMALISATIONS.height;
+        debug_assert_eq!(self.local_map_m.len(), LOCAL_MAP_CELLS);
+        for (normal, &height_m) in sample.local_map.iter_mut().zip(&self.local_map_m) {
+            *normal = height.apply(f32::from(height_m));
+        }
+        sample.devices[..self.devices.len()].copy_from_slice(&self.devices);
+        sample
+    }
+}
+
+/// The network's input for these tokens.
+#[must_use]
+pub fn normalise(tokens: &Tokens) -> Sample {
+    let mut sample = Observation::new(tokens).with(Preference::ENERGY);
+    sample.preference = tokens.preference;
+    sample
+}

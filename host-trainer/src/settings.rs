@@ -1,0 +1,153 @@
+//! Everything that shapes a training run, with its unit and default. Stored in every checkpoint.
+
+use gleaner_policy::Preference;
+use gleaner_units::{BatteryUnits, Cell};
+use gleaner_world::{Realization, Scenario, ScenarioError, ScenarioKind, Seed, Stream, World};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// Hyper-parameters and the distribution of missions. The defaults are the paper's where it gives a number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+pub struct Settings {
+    /// Names every random draw of the run.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Updates until the run is done.
+    #[arg(long, default_value_t = 150_000)]
+    pub updates: u64,
+    /// Slots flown per update, each in a flight of its own. The paper flies one.
+    #[arg(long, default_value_t = 4)]
+    pub steps_per_update: usize,
+    /// Slots flown at random before the first update.
+    #[arg(long, default_value_t = 5_000)]
+    pub warm_up: usize,
+    /// Transitions in one batch (paper: 32).
+    #[arg(long, default_value_t = 32)]
+    pub batch: usize,
+    /// Preferences per transition and update (paper, J = 3).
+    #[arg(long, default_value_t = 3)]
+    pub preferences: usize,
+    /// Transitions kept (paper: 100,000).
+    #[arg(long, default_value_t = 100_000)]
+    pub replay: usize,
+    /// Adam's step size at the start (paper: 3e-4).
+    #[arg(long, default_value_t = 3e-4)]
+    pub learning_rate: f32,
+    /// Adam's step size at the end; it falls linearly over the second half of the run. The paper keeps it.
+    #[arg(long, default_value_t = 3e-4)]
+    pub learning_rate_end: f32,
+    /// Discount per slot (paper: 0.99).
+    #[arg(long, default_value_t = 0.99)]
+    pub discount: f32,
+    /// Share of the critics that the targets take over per update.
+    #[arg(long, default_value_t = 0.005)]
+    pub polyak: f32,
+    /// Target entropy at the start, as a share of the logarithm of the number of allowed actions (paper: 0.6).
+    #[arg(long, default_value_t = 0.6)]
+    pub entropy_start: f32,
+    /// Target entropy at the end (paper: 0.3).
+    #[arg(long, default_value_t = 0.3)]
+    pub entropy_end: f32,
+    /// Temperature of the exploring softmax at the start (paper: 5).
+    #[arg(long, default_value_t = 5.0)]
+    pub heat_start: f32,
+    /// Temperature of the exploring softmax at the end (paper: 1.5).
+    #[arg(long, default_value_t = 1.5)]
+    pub heat_end: f32,
+    /// Updates over which target entropy and heat move from start to end (paper: 100,000 steps).
+    #[arg(long, default_value_t = 100_000)]
+    pub anneal: u64,
+    /// Weight of the entropy, nu, before it is learned; in scaled rewards.
+    #[arg(long, default_value_t = 0.05)]
+    pub entropy_weight: f32,
+    /// The networks see rewards times this, so that values lie within a few units of zero.
+    #[arg(long, default_value_t = 0.05)]
+    pub reward_scale: f32,
+    /// Share of flights under a pure preference, (1, 0) or (0, 1); the rest is uniform.
+    #[arg(long, default_value_t = 0.2)]
+    pub pure_preferences: f64,
+    /// Share of missions with the default zones of RD.
+    #[arg(long, default_value_t = 1.0)]
+    pub share_rd: f64,
+    /// Share of missions with the default zone of RB. What RD and RB leave starts and ends anywhere.
+    #[arg(long, default_value_t = 0.0)]
+    pub share_rb: f64,
+    /// Share of missions with another number of devices (1 to 12) and another battery (50 to 120) than K = 6 and
+    /// B = 80. The paper trains with none.
+    #[arg(long, default_value_t = 0.0)]
+    pub share_varied: f64,
+}
+
+impl Settings {
+    /// The mission with this number: every draw comes from the run's seed and the number.
+    ///
+    /// # Errors
+    /// The city has no room for it.
+    pub fn mission(&self, world: &World, number: u64) -> Result<Mission, ScenarioError> {
+        // Runs with other seeds never share a mission in the first 2^32.
+        let seed = Seed::training((self.seed << 32).wrapping_add(number));
+        let mut rng = seed.rng(Stream::Choices);
+        let mut scenario = self.zones(world, &mut rng);
+        if rng.random_bool(self.share_varied) {
+            let battery = BatteryUnits(rng.random_range(50..=120) as f32);
+            scenario = scenario.with_devices(rng.random_range(1..=12)).with_battery(battery);
+        }
+        let preference = if rng.random_bool(self.pure_preferences) {
+            if rng.random_bool(0.5) { Preference::DATA } else { Preference::ENERGY }
+        } else {
+            random_preference(&mut rng)
+        };
+        Ok(Mission { seed, realization: Realization::draw(world.city(), &scenario, seed)?, preference })
+    }
+
+    fn zones(&self, world: &World, rng: &mut ChaCha8Rng) -> Scenario {
+        let choice: f64 = rng.random();
+        if choice < self.share_rd {
+            return ScenarioKind::ReachDestination.scenario();
+        }
+        let base = ScenarioKind::ReturnBase.scenario();
+        if choice < self.share_rd + self.share_rb {
+            return base;
+        }
+        let open = world.city().open_cells();
+        let mut cell = || -> Cell { open[rng.random_range(0..open.len())] };
+        // The farthest corners are 68 moves apart and the smallest battery is 50, so draw until it is near enough.
+        loop {
+            let scenario = Scenario { start: cell(), terminal: cell(), ..base };
+            if scenario.shortest_moves() <= 45 {
+                return scenario;
+            }
+        }
+    }
+
+    /// How far along the annealing is, 0 to 1.
+    #[must_use]
+    pub fn annealed(&self, update: u64) -> f32 {
+        (update as f64 / self.anneal.max(1) as f64).min(1.0) as f32
+    }
+
+    /// Adam's step size at this update.
+    #[must_use]
+    pub fn learning_rate_at(&self, update: u64) -> f32 {
+        let progress = update as f64 / self.updates.max(1) as f64;
+        let falling = ((progress - 0.5) * 2.0).clamp(0.0, 1.0) as f32;
+        self.learning_rate + (self.learning_rate_end - self.learning_rate) * falling
+    }
+}
+
+/// Uniform over the preferences.
+pub fn random_preference(rng: &mut ChaCha8Rng) -> Preference {
+    Preference::new(rng.random::<f32>()).unwrap_or(Preference::DATA)
+}
+
+/// A mission to learn from.
+#[derive(Clone, Debug)]
+pub struct Mission {
+    /// Names its draws.
+    pub seed: Seed,
+    /// The devices.
+    pub realization: Realization,
+    /// What it is flown for.
+    pub preference: Preference,
+}

@@ -1,0 +1,346 @@
+//! The training loop, read top to bottom.
+
+use crate::checkpoint::{self, CheckpointError};
+use crate::evaluation::{DeciderError, Network, Table, evaluate};
+use crate::flight::Flight;
+use crate::mosac::{Distribution, Learner, Losses, Rates};
+use crate::net::Shape;
+use crate::replay::{Replay, Transition};
+use crate::settings::{Settings, random_preference};
+use gleaner_units::Action;
+use gleaner_world::{Realization, ScenarioError, ScenarioKind, Seed, World};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// The checkpoint's name inside the output folder.
+pub const CHECKPOINT: &str = "run.checkpoint";
+/// The learning curve's name inside the output folder: one JSON object a line.
+pub const CURVE: &str = "curve.jsonl";
+/// Realizations that choose the best parameters have numbers from here on; those that judge count from 0.
+const VALIDATION_FROM: u64 = 10_000;
+const VALIDATION_COUNT: u64 = 60;
+
+/// Why a run cannot start or go on.
+#[derive(Debug, Error)]
+pub enum TrainError {
+    /// The checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The missions.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The network.
+    #[error(transparent)]
+    Decider(#[from] DeciderError),
+    /// The folder belongs to another run.
+    #[error(
+        "{}: holds a run with other settings; train into another --out folder, or repeat the settings of that run",
+        path.display()
+    )]
+    OtherSettings {
+        /// The checkpoint.
+        path: PathBuf,
+    },
+}
+
+/// What a run tells while it goes on.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Progress {
+    /// Updates done.
+    pub update: u64,
+    /// Slots flown.
+    pub steps: u64,
+    /// Of the last update.
+    pub losses: Losses,
+    /// Per scenario that is trained: name and validation table.
+    pub tables: Vec<(String, Table)>,
+}
+
+impl Progress {
+    /// What the best parameters are chosen by: the mean hypervolume over the scenarios.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        self.tables.iter().map(|(_, table)| table.hypervolume).sum::<f64>() / self.tables.len().max(1) as f64
+    }
+}
+
+/// The parameters with the best validation so far.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Best {
+    /// The actor.
+    pub actor: Vec<f32>,
+    /// Update at which it was found.
+    pub update: u64,
+    /// Slots flown until then.
+    pub steps: u64,
+    /// Mean hypervolume on the validation realizations.
+    pub score: f64,
+}
+
+/// A run: everything that the next update depends on.
+pub struct Run {
+    settings: Settings,
+    world: Arc<World>,
+    learner: Learner,
+    replay: Replay,
+    flights: Vec<Going>,
+    next_mission: u64,
+    rng: ChaCha8Rng,
+    update: u64,
+    steps: u64,
+    best: Option<Best>,
+    validation: Vec<(ScenarioKind, Vec<(Seed, Realization)>)>,
+}
+
+/// A flight in the air, and how it came there: the checkpoint keeps the way, not the place.
+struct Going {
+    mission: u64,
+    actions: Vec<u8>,
+    flight: Flight,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    settings: Settings,
+    learner: Learner,
+    replay: Replay,
+    flights: Vec<(u64, Vec<u8>)>,
+    next_mission: u64,
+    rng_seed: [u8; 32],
+    rng_word: u128,
+    update: u64,
+    steps: u64,
+    best: Option<Best>,
+}
+
+/// What `evaluate` and `export` need of a checkpoint.
+#[derive(Clone, Debug)]
+pub struct Trained {
+    /// How it was made.
+    pub settings: Settings,
+    /// The best parameters; those of the last update before the first validation.
+    pub best: Best,
+    /// Updates done when the checkpoint was written.
+    pub update: u64,
+}
+
+impl Run {
+    /// Goes on from the checkpoint in `folder`, or starts a new run when there is none.
+    ///
+    /// # Errors
+    /// See [`TrainError`].
+    pub fn open(settings: Settings, folder: &Path) -> Result<Run, TrainError> {
+        let path = folder.join(CHECKPOINT);
+        if !path.exists() {
+            return Run::new(settings);
+        }
+        let stored: Stored = checkpoint::load(&path)?;
+        // A finished run may be prolonged.
+        if (Settings { updates: settings.updates, ..stored.settings.clone() }) != settings {
+            return Err(TrainError::OtherSettings { path });
+        }
+        Run::restore(settings, stored)
+    }
+
+    fn new(settings: Settings) -> Result<Run, TrainError> {
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+        let learner = Learner::new(&settings, &mut rng);
+        let mut run = Run::assemble(settings, learner, rng)?;
+        for _ in 0..run.settings.steps_per_update {
+            let going = run.next_flight()?;
+            run.flights.push(going);
+        }
+        Ok(run)
+    }
+
+    fn restore(settings: Settings, stored: Stored) -> Result<Run, TrainError> {
+        let mut rng = ChaCha8Rng::from_seed(stored.rng_seed);
+        rng.set_word_pos(stored.rng_word);
+        let mut run = Run::assemble(settings, stored.learner, rng)?;
+        run.replay = stored.replay;
+        run.next_mission = stored.next_mission;
+        run.update = stored.update;
+        run.steps = stored.steps;
+        run.best = stored.best;
+        for (mission, actions) in stored.flights {
+            let mut flight = run.flight(mission)?;
+            for &action in &actions {
+                flight.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
+            }
+            run.flights.push(Going { mission, actions, flight });
+        }
+        Ok(run)
+    }
+
+    fn assemble(settings: Settings, learner: Learner, rng: ChaCha8Rng) -> Result<Run, TrainError> {
+        let world = Arc::new(World::default_world());
+        let mut validation = Vec::new();
+        for (kind, share) in [
+            (ScenarioKind::ReachDestination, settings.share_rd),
+            (ScenarioKind::ReturnBase, settings.share_rb),
+        ] {
+            if share > 0.0 {
+                let drawn = (VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT)
+                    .map(|number| {
+                        let seed = Seed::evaluation(number);
+                        Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))
+                    })
+                    .collect::<Result<_, ScenarioError>>()?;
+                validation.push((kind, drawn));
+            }
+        }
+        Ok(Run {
+            replay: Replay::new(settings.replay),
+            settings,
+            world,
+            learner,
+            flights: Vec::new(),
+            next_mission: 0,
+            rng,
+            update: 0,
+            steps: 0,
+            best: None,
+            validation,
+        })
+    }
+
+    fn flight(&self, mission: u64) -> Result<Flight, ScenarioError> {
+        let mission = self.settings.mission(&self.world, mission)?;
+        Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)
+    }
+
+    fn next_flight(&mut self) -> Result<Going, ScenarioError> {
+        let mission = self.next_mission;
+        self.next_mission += 1;
+        Ok(Going { mission, actions: Vec::new(), flight: self.flight(mission)? })
+    }
+
+    /// Updates done.
+    #[must_use]
+    pub const fn update(&self) -> u64 {
+        self.update
+    }
+
+    /// Whether the settings ask for no more updates.
+    #[must_use]
+    pub const fn is_done(&self) -> bool {
+        self.update >= self.settings.updates
+    }
+
+    /// One update of the networks, after as many slots as the settings say. Fills the memory first.
+    ///
+    /// # Errors
+    /// No mission could be drawn.
+    pub fn advance(&mut self) -> Result<Losses, TrainError> {
+        while self.replay.len() < self.settings.warm_up.min(self.settings.replay) {
+            self.fly(true)?;
+        }
+        self.fly(false)?;
+        let transitions = self.replay.sample(self.settings.batch, &mut self.rng);
+        let preferences: Vec<_> = (0..self.settings.batch * self.settings.preferences)
+            .map(|_| {
+                // The corners are a null set of the uniform distribution, and what operators use most.
+                match self.rng.random_range(0..20) {
+                    0 => gleaner_policy::Preference::DATA,
+                    1 => gleaner_policy::Preference::ENERGY,
+                    _ => random_preference(&mut self.rng),
+                }
+            })
+            .collect();
+        let annealed = self.settings.annealed(self.update);
+        let rates = Rates {
+            learning_rate: self.settings.learning_rate_at(self.update),
+            entropy_target: mix(self.settings.entropy_start, self.settings.entropy_end, annealed),
+        };
+        let losses = self.learner.update(&self.settings, rates, &transitions, &preferences);
+        self.update += 1;
+        Ok(losses)
+    }
+
+    /// One slot of every flight, explored with the heated softmax (paper, eq. 20).
+    fn fly(&mut self, uniform: bool) -> Result<(), TrainError> {
+        let heat = mix(self.settings.heat_start, self.settings.heat_end, self.settings.annealed(self.update));
+        let observations: Vec<_> = self.flights.iter().map(|going| going.flight.observe()).collect();
+        let logits = Network::new(Shape::actor(), self.learner.actor()).logits(
+            self.flights.iter().zip(&observations).map(|(going, seen)| seen.with(going.flight.preference())),
+        );
+        for (index, (before, logits)) in observations.into_iter().zip(logits).enumerate() {
+            let going = &mut self.flights[index];
+            let mask_before = going.flight.mask();
+            let heated = if uniform { [0.0; Action::COUNT] } else { logits.map(|logit| logit / heat) };
+            let action = Distribution::new(&heated, mask_before).pick(self.rng.random());
+            let reward = going.flight.step(action);
+            going.actions.push(action.index() as u8);
+            let over = going.flight.is_over();
+            let (after, mask_after) = (going.flight.observe(), going.flight.mask());
+            self.replay.push(Transition { before, mask_before, action, reward, after, mask_after, over });
+            self.steps += 1;
+            if over {
+                self.flights[index] = self.next_flight()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Judges the actor on the validation realizations and remembers it if it is the best so far.
+    ///
+    /// # Errors
+    /// The network's answer is not a number: the run diverged.
+    pub fn validate(&mut self, losses: Losses) -> Result<Progress, TrainError> {
+        let mut progress = Progress { update: self.update, steps: self.steps, losses, tables: Vec::new() };
+        for (kind, realizations) in &self.validation {
+            let mut network = Network::new(Shape::actor(), self.learner.actor());
+            let table = evaluate(&self.world, realizations, &mut network)?;
+            progress.tables.push((kind.name().to_owned(), table));
+        }
+        let score = progress.score();
+        if self.best.as_ref().is_none_or(|best| score > best.score) {
+            let actor = self.learner.actor().to_vec();
+            self.best = Some(Best { actor, update: self.update, steps: self.steps, score });
+        }
+        Ok(progress)
+    }
+
+    /// Writes everything that the next update depends on.
+    ///
+    /// # Errors
+    /// The disk; the last good checkpoint is then still there.
+    pub fn save(&self, folder: &Path) -> Result<(), TrainError> {
+        let stored = Stored {
+            settings: self.settings.clone(),
+            learner: self.learner.clone(),
+            replay: self.replay.clone(),
+            flights: self.flights.iter().map(|going| (going.mission, going.actions.clone())).collect(),
+            next_mission: self.next_mission,
+            rng_seed: self.rng.get_seed(),
+            rng_word: self.rng.get_word_pos(),
+            update: self.update,
+            steps: self.steps,
+            best: self.best.clone(),
+        };
+        Ok(checkpoint::save(&folder.join(CHECKPOINT), &stored)?)
+    }
+}
+
+/// Reads what was learned out of the checkpoint in `folder`.
+///
+/// # Errors
+/// There is none, or it is damaged.
+pub fn trained(folder: &Path) -> Result<Trained, TrainError> {
+    let stored: Stored = checkpoint::load(&folder.join(CHECKPOINT))?;
+    let best = stored.best.unwrap_or_else(|| Best {
+        actor: stored.learner.actor().to_vec(),
+        update: stored.update,
+        steps: stored.steps,
+        score: f64::NAN,
+    });
+    Ok(Trained { settings: stored.settings, best, update: stored.update })
+}
+
+fn mix(start: f32, end: f32, progress: f32) -> f32 {
+    start + (end - start) * progress
+}
