@@ -1,0 +1,98 @@
+//! The house: who may depend on whom. Arrows point down the ranks, never sideways or up.
+
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+
+/// Folder and rank of every member.
+const RANKS: [(&str, u8); 12] = [
+    ("firmware/units", 0),
+    ("firmware/ports", 0),
+    ("firmware/guard", 1),
+    ("firmware/policy", 1),
+    ("firmware/link", 1),
+    ("firmware/radio", 1),
+    ("firmware/pilot", 2),
+    ("firmware/companion", 3),
+    ("sitl/world", 1),
+    ("sitl/harness", 3),
+    ("host-trainer", 3),
+    ("tests", 4),
+];
+
+/// Every edge between members, as folders: (who depends, on whom). Tests' and benches' edges count too.
+fn edges() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let output = Command::new(env!("CARGO"))
+        .args(["metadata", "--no-deps", "--format-version", "1"])
+        .current_dir(root)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metadata: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    let folder = |package: &Value| {
+        let manifest = Path::new(package["manifest_path"].as_str().unwrap());
+        manifest.parent().unwrap().strip_prefix(root).unwrap().to_str().unwrap().to_owned()
+    };
+    let folders: BTreeMap<&str, String> =
+        packages.iter().map(|package| (package["name"].as_str().unwrap(), folder(package))).collect();
+    let mut members: Vec<&str> = folders.values().map(String::as_str).collect();
+    let mut ranked = RANKS.map(|(folder, _)| folder);
+    members.sort_unstable();
+    ranked.sort_unstable();
+    assert_eq!(members, ranked, "a member without a rank, or a rank without a member");
+    packages
+        .iter()
+        .flat_map(|package| {
+            let from = folder(package);
+            package["dependencies"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter_map(|dependency| folders.get(dependency["name"].as_str().unwrap()))
+                .map(move |to| (from.clone(), to.clone()))
+                .collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+#[test]
+fn arrows_point_down() {
+    let rank = |folder: &str| RANKS.iter().find(|(known, _)| *known == folder).unwrap().1;
+    let edges = edges();
+    assert!(edges.len() > 20, "the reading of the metadata is broken: {edges:?}");
+    let wrong: Vec<_> = edges.iter().filter(|(from, to)| rank(to) >= rank(from)).collect();
+    assert!(wrong.is_empty(), "sideways or up: {wrong:?}");
+}
+
+#[test]
+fn firmware_depends_on_nothing_outside_firmware() {
+    let wrong: Vec<_> = edges()
+        .into_iter()
+        .filter(|(from, to)| from.starts_with("firmware/") && !to.starts_with("firmware/"))
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn the_guard_does_not_know_that_learning_exists() {
+    let known: Vec<_> =
+        edges().into_iter().filter(|(from, _)| from == "firmware/guard").map(|(_, to)| to).collect();
+    assert_eq!(known, ["firmware/units"]);
+}
+
+#[test]
+fn trainer_simulator_and_aircraft_share_one_observation_builder_and_one_mask() {
+    let edges = edges();
+    for (user, owner) in [
+        ("host-trainer", "firmware/policy"),
+        ("host-trainer", "firmware/guard"),
+        ("firmware/pilot", "firmware/policy"),
+        ("firmware/pilot", "firmware/guard"),
+        ("sitl/harness", "firmware/pilot"),
+    ] {
+        assert!(edges.contains(&(user.into(), owner.into())), "{user} does not use {owner}");
+    }
+}
