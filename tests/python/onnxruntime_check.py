@@ -34,6 +34,8 @@ def main(model_path, folder):
     batch = session.run(names, inputs)
     first = session.run(names, {name: numbers[:1] for name, numbers in inputs.items()})
     for name, many, one in zip(names, batch, first):
+        if not numpy.isfinite(many).all():
+            sys.exit(f"output {name} is not finite")
         difference = abs(many[:1] - one).max()
         if not difference <= 1e-5:
             sys.exit(f"output {name} depends on the other samples of the batch: {difference}")
