@@ -5,6 +5,7 @@
 //! learner never spends capacity on what cannot be flown.
 
 use crate::net::{self, Adam, Batch, Shape, Workspace};
+use crate::observation::Observation;
 use crate::replay::Transition;
 use crate::settings::Settings;
 use gleaner_policy::Preference;
@@ -152,7 +153,12 @@ impl Learner {
             .iter()
             .enumerate()
             .map(|(index, (transition, _))| {
-                let mut target = transition.reward.map(|reward| reward * settings.reward_scale);
+                let [data, energy] = transition.reward;
+                let potential = |seen: &Observation| -settings.shaping * seen.way_to_terminal();
+                // On the terminal the way is zero, so the end of a mission needs no case of its own.
+                let shaped =
+                    energy + settings.discount * potential(&transition.after) - potential(&transition.before);
+                let mut target = [data, shaped].map(|reward| reward * settings.reward_scale);
                 if !transition.over {
                     let policy = Distribution::new(&logits[index], transition.mask_after);
                     for (objective, target) in target.iter_mut().enumerate() {

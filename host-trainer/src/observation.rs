@@ -56,6 +56,12 @@ impl Observation {
         Observation { uav, local_map_m: tokens.local_map.iter().map(|&m| m as u8).collect(), devices }
     }
 
+    /// Moves to the terminal: battery minus spare battery.
+    #[must_use]
+    pub fn way_to_terminal(&self) -> f32 {
+        (self.uav[1] - self.uav[0]) * schema::BATTERY.scale
+    }
+
     /// The network's input for this state under a preference.
     #[must_use]
     pub fn with(&self, preference: Preference) -> Sample {

@@ -64,6 +64,11 @@ pub struct Settings {
     /// The networks see rewards times this, so that values lie within a few units of zero.
     #[arg(long, default_value_t = 0.05)]
     pub reward_scale: f32,
+    /// Share of the way to the terminal that counts as potential of the energy objective. Shaping by a potential
+    /// changes no optimal policy (Ng, Harada and Russell 1999), but a critic that need not learn the way home first
+    /// learns faster. The paper has none.
+    #[arg(long, default_value_t = 0.0)]
+    pub shaping: f32,
     /// Share of flights under a pure preference, (1, 0) or (0, 1); the rest is uniform.
     #[arg(long, default_value_t = 0.2)]
     pub pure_preferences: f64,
