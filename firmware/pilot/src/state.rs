@@ -23,9 +23,9 @@ use serde::{Deserialize, Serialize};
 ///   |   Homing -- another mode -> Passive      Fault --- new request ---> Waiting, Shadow, Idle
 ///   |      | landing confirmed
 ///   |      v
-///   |    Done    landing, then landed
-///   |      |
-///   +------+---- disarmed, request off: from every state but Fault and Boot
+///   |    Done    landing, then landed --- another mode while landing -> Passive
+///   |
+///   +--- request off: from every state. Disarmed: from Waiting, Engaged and Homing (Done when landing).
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum State {
@@ -81,12 +81,12 @@ pub enum Missing {
     Autopilot,
     /// A failsafe is latched.
     FailsafeClear,
-    /// The estimator does not trust its position, or says nothing.
-    Estimator,
-    /// No position, or an old one.
-    Position,
     /// The estimator's origin is unknown.
     Origin,
+    /// No position, or an old one.
+    Position,
+    /// The estimator does not trust its position, or says nothing.
+    Estimator,
     /// The take-off point is unknown.
     Home,
     /// The battery percentage is unknown.

@@ -1,9 +1,9 @@
 //! The regular flight: decisions, legs, the ledger, landing, what is told.
 
-use crate::rig::{DOWN_M, Rig, TERMINAL};
+use crate::rig::{DOWN_M, Rig, TERMINAL, mission};
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode};
 use gleaner_pilot::{Request, State};
-use gleaner_units::{Action, BatteryUnits, Cell, MetresPerSecond, Ned};
+use gleaner_units::{Action, BatteryUnits, Cell, CellSet, Grid, HeightMap, Metres, MetresPerSecond, Ned};
 
 use Action::{East, Hover, North, West};
 
@@ -188,4 +188,21 @@ fn a_decision_record_fits_a_tunnel_and_comes_back() {
     let bytes = record.encode(&mut buffer).expect("the longest record fits");
     assert_eq!(DecisionRecord::decode(bytes), Some(record));
     assert_eq!(DecisionRecord::decode(&bytes[..bytes.len() - 1]), None);
+}
+
+#[test]
+fn small_cells_are_not_cut_short_by_a_large_arrival_radius() {
+    let mut small = mission();
+    let grid = Grid::new(8, 6, Metres(6.0)).unwrap();
+    small.heights = HeightMap::flat(grid);
+    small.fence = CellSet::full(grid);
+    let mut rig = Rig::with(small, true);
+    rig.set("GLN_ARRIVE_R", 10.0);
+    rig.engage();
+    rig.policy.then = East;
+    for _ in 0..3 {
+        while !rig.step().decided {}
+        let here = rig.centre(rig.machine.decision().unwrap().cell);
+        assert!(rig.vehicle.position.unwrap().horizontal_distance(&here).0 < 3.0, "in the cell");
+    }
 }

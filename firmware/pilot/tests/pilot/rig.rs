@@ -74,6 +74,8 @@ pub struct Rig {
     pub accepts: Option<bool>,
     /// Whether the aircraft flies to its targets.
     pub obeys: bool,
+    /// A cell whose centre the autopilot drops as a target without a word (its own fence).
+    pub dropped: Option<Cell>,
     pub target: Option<Ned>,
     pub texts: Vec<String>,
     pub setpoints: Vec<(u64, Ned)>,
@@ -121,6 +123,7 @@ impl Rig {
             ended: Vec::new(),
             accepts: Some(true),
             obeys: true,
+            dropped: None,
             target: None,
             texts: Vec::new(),
             setpoints: Vec::new(),
@@ -245,6 +248,9 @@ impl Rig {
     fn fly(&mut self, pause: Duration) {
         let (Some(position), Some(target)) = (self.vehicle.position, self.target) else { return };
         if !(self.obeys && self.vehicle.armed && self.vehicle.is_guided()) {
+            return;
+        }
+        if self.dropped.is_some_and(|cell| self.centre(cell) == target) {
             return;
         }
         let distance_m = position.horizontal_distance(&target).0;

@@ -3,7 +3,7 @@
 use crate::rig::{Rig, TERMINAL};
 use gleaner_link::{AutopilotCommand, FlightMode, SystemState};
 use gleaner_pilot::{Fault, Request, ReturnReason, State};
-use gleaner_units::{Action, Duration};
+use gleaner_units::{Action, Cell, Duration};
 
 use Action::{East, North, South, West};
 
@@ -118,13 +118,13 @@ fn a_target_that_the_autopilot_drops_turns_the_flight_home_after_20_s_and_back_a
 }
 
 #[test]
-fn another_way_home_is_tried_when_the_target_was_dropped() {
+fn a_dropped_target_is_given_up_and_the_way_home_is_flown() {
     let mut rig = Rig::engaged();
     rig.policy.then = West;
-    rig.run(0.8);
-    rig.obeys = false;
+    rig.dropped = Some(Cell::new(0, 1));
     rig.run_to(State::Homing);
-    rig.obeys = true;
+    assert_eq!(rig.machine.return_reason(), Some(ReturnReason::NoProgress));
+    assert_eq!(rig.machine.target(), Some(Cell::new(1, 1)), "back to the cell under the aircraft");
     rig.run_to(State::Done);
 }
 
