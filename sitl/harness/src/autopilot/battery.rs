@@ -5,10 +5,10 @@ use gleaner_units::{BatteryUnits, Duration, Instant, MetresPerSecond};
 
 /// A battery and what flying takes from it.
 ///
-/// Power is `hover power x (1 + (v / cruise)^2)`: hovering for one slot takes half a unit and flying one cell at cruise
-/// speed takes one, which are the prices that the decisions are made with (paper, eq. 4). Everything slower or longer
-/// costs more than those prices: a cell flown from rest to rest takes about 1.5 units, as the aircraft needs 5 s
-/// for it and not the 2 s of a slot.
+/// Power is `hover power x (1 + (v / cruise)^2)`. The hover power is chosen so that what the decisions are priced at
+/// (paper, eq. 4: one unit for a cell, half a unit for a slot of hovering) covers what they really take: a cell of
+/// 20 m from rest to rest lasts 5.2 s and takes 0.98 units, a hover of 2 s takes 0.32. On a real aircraft
+/// `GLN_BAT_UNITS` is set to make the same true; with dearer moves the envelope would promise too much.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pack {
     /// What it holds when full.
@@ -20,10 +20,10 @@ pub struct Pack {
 }
 
 impl Pack {
-    /// A pack for slots of `slot`, at `cruise`.
+    /// A full pack of this capacity in the aircraft of [`crate::Copter`].
     #[must_use]
-    pub fn new(capacity: BatteryUnits, slot: Duration, cruise: MetresPerSecond) -> Pack {
-        Pack { capacity, hover_per_s: 0.5 / slot.as_secs_f32(), cruise }
+    pub const fn new(capacity: BatteryUnits) -> Pack {
+        Pack { capacity, hover_per_s: 0.16, cruise: MetresPerSecond(10.0) }
     }
 }
 
@@ -134,21 +134,29 @@ impl Battery {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::autopilot::motion::{Body, SpeedLimits};
 
     fn battery() -> Battery {
-        Battery::new(Pack::new(BatteryUnits(100.0), Duration::from_secs(2), MetresPerSecond(10.0)))
+        Battery::new(Pack::new(BatteryUnits(100.0)))
     }
 
     #[test]
-    fn a_slot_of_hovering_takes_half_a_unit_and_a_cell_at_cruise_one() {
-        let ticks = |seconds: f64| (seconds / TICK_S).round() as u32;
+    fn a_cell_and_a_slot_take_no_more_than_they_are_priced_at() {
         let mut hovering = battery();
-        (0..ticks(2.0)).for_each(|_| hovering.draw(Some(0.0)));
-        assert!((hovering.left().0 - 99.5).abs() < 1e-4, "{:?}", hovering.left());
+        (0..100).for_each(|_| hovering.draw(Some(0.0)));
+        let taken = 100.0 - hovering.left().0;
+        assert!((0.25..=0.5).contains(&taken), "{taken} for 2 s");
         assert_eq!(hovering.percent(), 99, "cut off, not rounded");
         let mut flying = battery();
-        (0..ticks(20.0 / 10.0)).for_each(|_| flying.draw(Some(10.0)));
-        assert!((flying.left().0 - 99.0).abs() < 1e-4, "{:?}", flying.left());
+        let mut body = Body::at([0.0, 0.0, -60.0]);
+        let limits = SpeedLimits { horizontal_mps: 10.0, up_mps: 2.5, down_mps: 1.5 };
+        // Until arrival inside the default radius of 2 m.
+        while body.position[1] < 18.0 {
+            body.fly_to([0.0, 20.0, -60.0], [0.0; 3], limits);
+            flying.draw(Some(body.ground_speed_mps()));
+        }
+        let taken = 100.0 - flying.left().0;
+        assert!((0.9..=1.0).contains(&taken), "{taken} for 20 m");
     }
 
     #[test]

@@ -55,8 +55,10 @@ impl LinkId {
     pub const COMPANION: LinkId = LinkId(0);
     /// Where the ground station is.
     pub const GROUND: LinkId = LinkId(1);
-    /// Both.
-    pub const ALL: [LinkId; 2] = [LinkId::COMPANION, LinkId::GROUND];
+    /// Where the harness itself speaks when the ground link belongs to somebody else.
+    pub const CREW: LinkId = LinkId(2);
+    /// All of them.
+    pub const ALL: [LinkId; 3] = [LinkId::COMPANION, LinkId::GROUND, LinkId::CREW];
 }
 
 /// What the simulated aircraft is.
@@ -112,7 +114,7 @@ struct Link {
 pub struct Copter {
     settings: CopterSettings,
     now: Instant,
-    links: [Link; 2],
+    links: [Link; 3],
     routes: Routes,
     parameters: ParameterTable,
     mode: CopterMode,
@@ -151,7 +153,7 @@ impl Copter {
         Copter {
             settings,
             now: Instant::ZERO,
-            links: [link(), link()],
+            links: [link(), link(), link()],
             routes: Routes::default(),
             parameters: ParameterTable::new(settings.system_id),
             mode: CopterMode::Stabilize,

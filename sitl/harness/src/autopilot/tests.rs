@@ -4,7 +4,7 @@ use super::CopterMode as Mode;
 use super::*;
 use crate::wire::{Speaker, parse};
 use gleaner_link::Frame;
-use gleaner_units::{Duration, MetresPerSecond};
+use gleaner_units::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 
@@ -19,7 +19,7 @@ const LINK: LinkId = LinkId::COMPANION;
 
 impl Bench {
     fn new() -> Bench {
-        let pack = Pack::new(BatteryUnits(200.0), Duration::from_secs(2), MetresPerSecond(10.0));
+        let pack = Pack::new(BatteryUnits(200.0));
         let settings = CopterSettings {
             system_id: 1,
             origin: GeoPoint { lat_deg_e7: 481_000_000, lon_deg_e7: 115_000_000 },
@@ -352,10 +352,7 @@ fn parameters_are_listed_read_and_set() {
     });
     bench.listen(LINK);
     bench.listen(LinkId::GROUND);
+    bench.listen(LinkId::CREW);
     let values = bench.all::<PARAM_VALUE_DATA>();
-    assert_eq!(
-        values.iter().map(|value| value.param_value).collect::<Vec<_>>(),
-        [700.0, 700.0],
-        "on every link"
-    );
+    assert_eq!(values.iter().map(|value| value.param_value).collect::<Vec<_>>(), [700.0; 3], "on every link");
 }

@@ -1,0 +1,146 @@
+//! The devices on the ground, and the radio modem on board that reports how it hears them.
+//!
+//! # One process with the trainer
+//! The channel is drawn once per *slot*, as in the paper and in [`gleaner_world::Episode`], and not by time: a slot
+//! begins with a decision, serves one device at the present cell with the SNR that was reported there, and then
+//! every device is heard anew at the cell that the aircraft is sent to. So a flight through all this machinery collects
+//! exactly what an episode of the same seed and the same actions collects; a test says so.
+//!
+//! The reports of the next cell go out as soon as the slot is decided, while the aircraft is still on its way. That
+//! gives nothing away: between here and there nothing is decided, the next decision is made on arrival, and what the
+//! modem says of that cell is then simply up to date.
+
+use gleaner_radio::{Report, encode};
+use gleaner_units::{Action, Cell, Duration, Instant};
+use gleaner_world::{Field, Realization, ScenarioError, Seed, Serving, Stream, World};
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+/// Time between two rounds of reports.
+const ROUND: Duration = Duration::from_millis(200);
+
+/// The modem and the devices that it hears.
+#[derive(Clone, Debug)]
+pub struct Modem {
+    world: Arc<World>,
+    field: Field,
+    rng: ChaCha8Rng,
+    cell: Cell,
+    next_round: Instant,
+}
+
+/// The id in the reports of the device with this index.
+#[must_use]
+pub fn device_id(index: usize) -> u16 {
+    index as u16 + 1
+}
+
+impl Modem {
+    /// A modem at the start of a realization. `seed` names the shadowing.
+    ///
+    /// # Errors
+    /// The realization belongs to another city.
+    pub fn new(world: Arc<World>, realization: &Realization, seed: Seed) -> Result<Modem, ScenarioError> {
+        let mut field = Field::new(&world, realization)?;
+        let mut rng = seed.rng(Stream::Slots);
+        field.listen(&world, realization.start(), &mut rng);
+        Ok(Modem { world, field, rng, cell: realization.start(), next_round: Instant::ZERO })
+    }
+
+    /// One slot: serves at `cell`, then hears the devices at the cell that `action` leads to. Reports follow at once.
+    pub fn slot(&mut self, cell: Cell, action: Action) -> Option<Serving> {
+        self.carry_to(cell);
+        let serving = self.field.serve(&self.world);
+        self.cell = cell.after(action);
+        self.field.listen(&self.world, self.cell, &mut self.rng);
+        self.next_round = Instant::ZERO;
+        serving
+    }
+
+    /// The aircraft is over `cell` without having decided so: carried there by its pilot.
+    pub fn carry_to(&mut self, cell: Cell) {
+        if self.cell != cell {
+            self.cell = cell;
+            self.field.listen(&self.world, cell, &mut self.rng);
+            self.next_round = Instant::ZERO;
+        }
+    }
+
+    /// The bytes of the reports that are due: all devices that are heard at all, at 5 Hz.
+    pub fn reports(&mut self, now: Instant) -> Vec<u8> {
+        if now < self.next_round {
+            return Vec::new();
+        }
+        self.next_round = now + ROUND;
+        let mut bytes = Vec::new();
+        for (index, device) in self.field.devices().iter().enumerate() {
+            // Outside the city nothing is heard.
+            if device.snr.0.is_finite() {
+                let remaining = Some(device.remaining_units);
+                bytes.extend(encode(&Report {
+                    device: device_id(index),
+                    snr: device.snr,
+                    remaining,
+                    age_ms: 0,
+                }));
+            }
+        }
+        bytes
+    }
+
+    /// What the devices hold.
+    #[must_use]
+    pub const fn field(&self) -> &Field {
+        &self.field
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gleaner_radio::ReportDecoder;
+    use gleaner_world::{Episode, Scenario};
+
+    fn setup() -> (Arc<World>, Realization) {
+        let world = Arc::new(World::default_world());
+        let realization =
+            Realization::draw(world.city(), &Scenario::reach_destination(), Seed::evaluation(3)).unwrap();
+        (world, realization)
+    }
+
+    #[test]
+    fn slots_are_those_of_an_episode() {
+        let (world, realization) = setup();
+        let mut modem = Modem::new(Arc::clone(&world), &realization, Seed::evaluation(3)).unwrap();
+        let mut episode = Episode::new(world, &realization, Seed::evaluation(3)).unwrap();
+        for turn in 0..60 {
+            let action = Action::ALL[[4, 1, 0, 4, 3][turn % 5]];
+            let serving = modem.slot(episode.uav(), action);
+            let step = episode.step(action).unwrap();
+            assert_eq!(serving.map(|serving| serving.device), step.served);
+            assert_eq!(modem.field(), episode.field());
+        }
+    }
+
+    #[test]
+    fn reports_carry_what_is_heard_at_5_hz_and_at_once_after_a_slot() {
+        let (world, realization) = setup();
+        let mut modem = Modem::new(world, &realization, Seed::evaluation(3)).unwrap();
+        let decode = |bytes: &[u8]| {
+            let mut reports = Vec::new();
+            ReportDecoder::new().push(bytes, |report| reports.push(report));
+            reports
+        };
+        let reports = decode(&modem.reports(Instant::from_millis(20)));
+        assert_eq!(reports.len(), 6);
+        for (report, device) in reports.iter().zip(modem.field().devices()) {
+            assert_eq!((report.snr, report.remaining), (device.snr, Some(device.remaining_units)));
+        }
+        assert!(modem.reports(Instant::from_millis(200)).is_empty());
+        assert_eq!(decode(&modem.reports(Instant::from_millis(220))).len(), 6);
+        modem.slot(realization.start(), Action::East);
+        assert_eq!(decode(&modem.reports(Instant::from_millis(240))).len(), 6);
+        modem.carry_to(Cell::new(-1, 3));
+        assert!(modem.reports(Instant::from_millis(900)).is_empty(), "outside the city");
+    }
+}
