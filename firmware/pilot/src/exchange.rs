@@ -71,7 +71,7 @@ pub struct Outputs {
     pub command: Option<AutopilotCommand>,
     /// Lines for the operator.
     pub notices: Vec<Notice, 6>,
-    /// Whether a decision was made: see [`Machine::decision`].
+    /// Whether a decision was made: see [`crate::Machine::decision`].
     pub decided: bool,
     /// Once a second.
     pub telemetry: Option<Telemetry>,
