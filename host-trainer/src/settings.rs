@@ -1,5 +1,6 @@
 //! Everything that shapes a training run, with its unit and default. Stored in every checkpoint.
 
+use crate::greedy::Greedy;
 use gleaner_policy::Preference;
 use gleaner_units::{BatteryUnits, Cell};
 use gleaner_world::{Realization, Scenario, ScenarioError, ScenarioKind, Seed, Stream, World};
@@ -72,6 +73,10 @@ pub struct Settings {
     /// Share of flights under a pure preference, (1, 0) or (0, 1); the rest is uniform.
     #[arg(long, default_value_t = 0.2)]
     pub pure_preferences: f64,
+    /// Share of missions that GREEDY flies, with a random number of visits; in one slot of ten the policy explores
+    /// from where GREEDY has led. Shows the learner full devices early. The paper has none.
+    #[arg(long, default_value_t = 0.0)]
+    pub share_greedy: f64,
     /// Share of missions with the default zones of RD.
     #[arg(long, default_value_t = 1.0)]
     pub share_rd: f64,
@@ -103,7 +108,15 @@ impl Settings {
         } else {
             random_preference(&mut rng)
         };
-        Ok(Mission { seed, realization: Realization::draw(world.city(), &scenario, seed)?, preference })
+        let guide = rng
+            .random_bool(self.share_greedy)
+            .then(|| Greedy::new(rng.random_range(1..=scenario.device_count)));
+        Ok(Mission {
+            seed,
+            realization: Realization::draw(world.city(), &scenario, seed)?,
+            preference,
+            guide,
+        })
     }
 
     fn zones(&self, world: &World, rng: &mut ChaCha8Rng) -> Scenario {
@@ -155,4 +168,6 @@ pub struct Mission {
     pub realization: Realization,
     /// What it is flown for.
     pub preference: Preference,
+    /// Who flies it, if not the policy.
+    pub guide: Option<Greedy>,
 }

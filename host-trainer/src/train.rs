@@ -2,7 +2,8 @@
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::{DeciderError, Network, Table, evaluate};
-use crate::flight::Flight;
+use crate::flight::{Flight, Reward};
+use crate::greedy::Greedy;
 use crate::mosac::{Distribution, Learner, Losses, Rates};
 use crate::net::Shape;
 use crate::replay::{Replay, Transition};
@@ -101,6 +102,19 @@ struct Going {
     mission: u64,
     actions: Vec<u8>,
     flight: Flight,
+    guide: Option<Greedy>,
+}
+
+impl Going {
+    /// What the guide would do. To be asked once a slot, since it remembers where it was going.
+    fn advice(&mut self) -> Option<Action> {
+        self.guide.as_mut().map(|guide| guide.decide(&self.flight))
+    }
+
+    fn step(&mut self, action: Action) -> Reward {
+        self.actions.push(action.index() as u8);
+        self.flight.step(action)
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -167,11 +181,12 @@ impl Run {
         run.steps = stored.steps;
         run.best = stored.best;
         for (mission, actions) in stored.flights {
-            let mut flight = run.flight(mission)?;
-            for &action in &actions {
-                flight.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
+            let mut going = run.begin(mission)?;
+            for action in actions {
+                going.advice();
+                going.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
             }
-            run.flights.push(Going { mission, actions, flight });
+            run.flights.push(going);
         }
         Ok(run)
     }
@@ -208,15 +223,16 @@ impl Run {
         })
     }
 
-    fn flight(&self, mission: u64) -> Result<Flight, ScenarioError> {
-        let mission = self.settings.mission(&self.world, mission)?;
-        Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)
+    fn begin(&self, number: u64) -> Result<Going, ScenarioError> {
+        let mission = self.settings.mission(&self.world, number)?;
+        let flight = Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)?;
+        Ok(Going { mission: number, actions: Vec::new(), flight, guide: mission.guide })
     }
 
     fn next_flight(&mut self) -> Result<Going, ScenarioError> {
         let mission = self.next_mission;
         self.next_mission += 1;
-        Ok(Going { mission, actions: Vec::new(), flight: self.flight(mission)? })
+        self.begin(mission)
     }
 
     /// Updates done.
@@ -272,9 +288,10 @@ impl Run {
             let going = &mut self.flights[index];
             let mask_before = going.flight.mask();
             let heated = if uniform { [0.0; Action::COUNT] } else { logits.map(|logit| logit / heat) };
-            let action = Distribution::new(&heated, mask_before).pick(self.rng.random());
-            let reward = going.flight.step(action);
-            going.actions.push(action.index() as u8);
+            let explored = Distribution::new(&heated, mask_before).pick(self.rng.random());
+            let guided = !uniform && self.rng.random_bool(0.9);
+            let action = going.advice().filter(|_| guided).unwrap_or(explored);
+            let reward = going.step(action);
             let over = going.flight.is_over();
             let (after, mask_after) = (going.flight.observe(), going.flight.mask());
             self.replay.push(Transition { before, mask_before, action, reward, after, mask_after, over });

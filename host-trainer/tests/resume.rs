@@ -13,7 +13,7 @@ struct Command {
 
 fn settings(more: &[&str]) -> Settings {
     let usual = ["train", "--warm-up", "200", "--replay", "400", "--batch", "4", "--share-rb", "0.3"];
-    let shares = ["--share-rd", "0.3", "--share-varied", "0.5", "--updates", "60"];
+    let shares = ["--share-rd", "0.3", "--share-varied", "0.5", "--share-greedy", "0.5", "--updates", "60"];
     Command::parse_from(usual.iter().chain(&shares).chain(more)).settings
 }
 
