@@ -123,6 +123,24 @@ pub struct Figures {
 }
 
 impl Figures {
+    /// What a simulation has come to, under the preference that it began with.
+    #[must_use]
+    pub fn of(simulation: &Simulation, preference: f32, switches: usize) -> Figures {
+        let (plan, referee) = (&simulation.staged().plan, simulation.referee());
+        Figures {
+            scenario: plan.kind,
+            seed: plan.seed,
+            preference,
+            devices: simulation.field().devices().len(),
+            collected: simulation.field().collected_fraction(),
+            energy: referee.energy(),
+            decisions: referee.decisions(),
+            landed: referee.landed(),
+            violations: referee.violations().to_vec(),
+            switches,
+        }
+    }
+
     /// Landed, and no rule was broken.
     #[must_use]
     pub fn is_good(&self) -> bool {
@@ -160,6 +178,7 @@ pub fn fly<P: Policy>(
     let mut parameters = staged.parameters();
     parameters.push(("GLN_W_DATA", wishes.preference));
     let mut operator = Operator::new(Orders {
+        station_id: 255,
         system_id: staged.copter.system_id,
         component_id: settings.component_id,
         parameters,
@@ -266,19 +285,6 @@ impl Flown {
     /// The figures of this flight.
     #[must_use]
     pub fn figures(&self) -> Figures {
-        let (simulation, referee) = (&self.simulation, self.simulation.referee());
-        let plan = &simulation.staged().plan;
-        Figures {
-            scenario: plan.kind,
-            seed: plan.seed,
-            preference: self.wishes.preference,
-            devices: simulation.field().devices().len(),
-            collected: simulation.field().collected_fraction(),
-            energy: referee.energy(),
-            decisions: referee.decisions(),
-            landed: referee.landed(),
-            violations: referee.violations().to_vec(),
-            switches: self.switches,
-        }
+        Figures::of(&self.simulation, self.wishes.preference, self.switches)
     }
 }

@@ -26,6 +26,8 @@ pub struct Switch {
 /// What the operator is to do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orders {
+    /// System id of the ground station.
+    pub station_id: u8,
     /// The vehicle's system id.
     pub system_id: u8,
     /// The pilot's component id.
@@ -54,7 +56,8 @@ enum Step {
     Over,
 }
 
-const OWN: Address = Address::new(255, 190);
+/// `MAV_COMP_ID_MISSIONPLANNER`, the component of most ground stations.
+const COMPONENT: u8 = 190;
 const REPEAT: Duration = Duration::from_secs(1);
 /// `EKF_STATUS_REPORT`: attitude, velocity and position are all trusted.
 const ESTIMATOR_TRUSTED: u16 = 0x33F;
@@ -90,8 +93,8 @@ impl Operator {
     #[must_use]
     pub fn new(orders: Orders) -> Operator {
         Operator {
+            speaker: Speaker::new(Address::new(orders.station_id, COMPONENT)),
             orders,
-            speaker: Speaker::new(OWN),
             decoder: FrameDecoder::new(),
             step: Step::Peers,
             ask_at: Instant::ZERO,

@@ -1,7 +1,7 @@
 //! Whole missions through real MAVLink bytes, flown by simple policies.
 
 use gleaner_harness::{
-    CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Staged, Switch, Wishes, fly,
+    CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Staged, Switch, Wishes, fly, trajectory,
 };
 use gleaner_pilot::State;
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
@@ -197,6 +197,23 @@ fn flying_takes_no_more_from_the_pack_than_the_decisions_pay() {
     let taken = pack.capacity - flown.simulation.truth().battery;
     // Taking off and landing: 100 s at most.
     assert!(taken.0 <= flown.figures().energy.0 + 100.0 * pack.hover_per_s, "{taken:?}");
+}
+
+#[test]
+fn the_picture_shows_devices_hovers_and_switches() {
+    let switches = vec![Switch { after: Duration::from_secs(60), w_data: 0.1 }];
+    let flown = flown(rd(5), Wishes { switches, ..Wishes::plain(1.0) }, Waiter);
+    let picture = trajectory(&flown.simulation, &flown.figures(), "waiter");
+    assert!(picture.starts_with("<svg") && picture.trim_end().ends_with("</svg>"));
+    for part in ["RD, seed 5, 6 devices", "policy waiter", "hovered for ", "w 1.00 \u{2192} 0.10", "#time"] {
+        assert!(picture.contains(part), "{part}");
+    }
+    let figures = flown.figures();
+    let (percent, units) = (100.0 * figures.collected, figures.energy.0);
+    assert!(
+        picture.contains(&format!("{percent:.1} % of the data for {units} battery units")),
+        "{figures:?}"
+    );
 }
 
 #[test]
