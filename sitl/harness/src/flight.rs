@@ -197,7 +197,7 @@ pub fn fly<P: Policy>(
             operator.receive(now, &frame);
         }
         for frame in operator.poll(now) {
-            simulation.from_ground(&frame);
+            simulation.hear_ground(&frame);
         }
         simulation.crew(&[]);
         exchange(&mut simulation, &mut onboard, now);
@@ -235,7 +235,7 @@ pub(crate) fn exchange<P: Policy>(simulation: &mut Simulation, onboard: &mut Onb
         if length == 0 {
             break;
         }
-        simulation.from_companion(&buffer[..length]);
+        simulation.hear_companion(&buffer[..length]);
     }
 }
 

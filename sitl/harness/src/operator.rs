@@ -326,7 +326,7 @@ impl Operator {
     }
 
     fn switches_by_command(&self) -> bool {
-        self.switched % 2 == 0
+        self.switched.is_multiple_of(2)
     }
 
     fn set_parameter(&mut self, name: &'static str, value: f32) -> Vec<u8> {

@@ -208,7 +208,8 @@ impl Referee {
         // A return is flown on a shortest way, which the envelope allows as long as the battery lasts at all.
         let shortens =
             self.guard.distance(record.cell.after(record.action)) < self.guard.distance(record.cell);
-        if !allowed.allows(record.action) && !(record.state == State::Homing && shortens) {
+        let returns = record.state == State::Homing && shortens;
+        if !(returns || allowed.allows(record.action)) {
             let (cell, action) = (record.cell, record.action);
             self.violated(now, Breach::NotAllowed { cell, action, allowed });
         }

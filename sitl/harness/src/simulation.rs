@@ -71,7 +71,7 @@ impl Simulation {
     }
 
     /// What the companion sends to the autopilot, in any pieces.
-    pub fn from_companion(&mut self, mut bytes: &[u8]) {
+    pub fn hear_companion(&mut self, mut bytes: &[u8]) {
         let now = self.now;
         let all = bytes;
         while !bytes.is_empty() {
@@ -86,7 +86,7 @@ impl Simulation {
     }
 
     /// What the ground station sends.
-    pub fn from_ground(&mut self, mut bytes: &[u8]) {
+    pub fn hear_ground(&mut self, mut bytes: &[u8]) {
         let now = self.now;
         let all = bytes;
         while !bytes.is_empty() {

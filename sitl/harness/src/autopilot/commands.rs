@@ -33,10 +33,11 @@ impl Copter {
             },
             SET_MODE => self.set_mode(link, frame),
             REQUEST_DATA_STREAM => self.set_all_streams(link, frame),
-            _ => match Message::decode(frame) {
-                Ok(Some(message)) => self.handle_message(link, frame.sender, &message),
-                _ => {}
-            },
+            _ => {
+                if let Ok(Some(message)) = Message::decode(frame) {
+                    self.handle_message(link, frame.sender, &message);
+                }
+            }
         }
     }
 

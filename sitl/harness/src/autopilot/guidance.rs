@@ -273,7 +273,7 @@ impl Copter {
         let position = match asked.coordinate_frame as u32 {
             1 => position,
             7 => self.offset(position),
-            8 | 9 => self.offset(self.from_body(position)),
+            8 | 9 => self.offset(self.body_to_local(position)),
             _ => {
                 self.guidance = Guidance::Halt;
                 return;
@@ -291,7 +291,7 @@ impl Copter {
         [north + by[0], east + by[1], down + by[2]]
     }
 
-    fn from_body(&self, [forward, right, down]: Vector) -> Vector {
+    fn body_to_local(&self, [forward, right, down]: Vector) -> Vector {
         let [north, east] = self.heading;
         [forward * north - right * east, forward * east + right * north, down]
     }

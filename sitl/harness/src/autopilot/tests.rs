@@ -329,7 +329,7 @@ fn ground_station_and_companion_hear_each_other_once_both_have_spoken() {
     bench.heard.clear();
     bench.copter.receive(LinkId::GROUND, &ground.frame(&command));
     bench.listen(LINK);
-    assert_eq!(bench.all::<COMMAND_LONG_DATA>(), [command.clone()]);
+    assert_eq!(bench.all::<COMMAND_LONG_DATA>(), std::slice::from_ref(&command));
     bench.heard.clear();
     bench.listen(LinkId::GROUND);
     assert_eq!(bench.count(COMMAND_ACK_DATA::ID), 0, "not for the autopilot: it does not answer");

@@ -150,9 +150,9 @@ impl Server {
         self.now = self.now + TICK;
         let simulation = &mut self.simulation;
         if let Some(companion) = &mut self.companion {
-            receive(companion, |bytes| simulation.from_companion(bytes));
+            receive(companion, |bytes| simulation.hear_companion(bytes));
         }
-        receive(&mut self.ground, |bytes| simulation.from_ground(bytes));
+        receive(&mut self.ground, |bytes| simulation.hear_ground(bytes));
         simulation.step(self.now);
         match &mut self.onboard {
             Some((onboard, _)) => exchange(simulation, onboard, self.now),
