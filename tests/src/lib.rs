@@ -3,4 +3,5 @@
 //! # Glossary
 //! - **judge**: a program that is not ours and says whether ours is right.
 
+pub mod programs;
 pub mod python;
