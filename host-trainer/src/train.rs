@@ -5,7 +5,7 @@ use crate::evaluation::{DeciderError, Network, Table, evaluate};
 use crate::flight::{Flight, Reward};
 use crate::greedy::Greedy;
 use crate::mosac::{Distribution, Learner, Losses, Rates};
-use crate::net::Shape;
+use crate::net::{self, Shape};
 use crate::replay::{Replay, Transition};
 use crate::settings::{Settings, random_preference};
 use gleaner_units::Action;
@@ -24,6 +24,9 @@ pub const CURVE: &str = "curve.jsonl";
 /// Realizations that choose the best parameters have numbers from here on; those that judge count from 0.
 const VALIDATION_FROM: u64 = 10_000;
 const VALIDATION_COUNT: u64 = 60;
+/// Share of the actor that its running average takes over per update. The average is what is judged and shipped:
+/// single updates are noisy, and the noise does not fly. It does not act back on the training.
+const AVERAGING: f32 = 0.001;
 
 /// Why a run cannot start or go on.
 #[derive(Debug, Error)]
@@ -94,6 +97,7 @@ pub struct Run {
     update: u64,
     steps: u64,
     best: Option<Best>,
+    averaged_actor: Vec<f32>,
     validation: Vec<(ScenarioKind, Vec<(Seed, Realization)>)>,
 }
 
@@ -129,6 +133,7 @@ struct Stored {
     update: u64,
     steps: u64,
     best: Option<Best>,
+    averaged_actor: Vec<f32>,
 }
 
 /// What `evaluate` and `export` need of a checkpoint.
@@ -180,6 +185,7 @@ impl Run {
         run.update = stored.update;
         run.steps = stored.steps;
         run.best = stored.best;
+        run.averaged_actor = stored.averaged_actor;
         for (mission, actions) in stored.flights {
             let mut going = run.begin(mission)?;
             for action in actions {
@@ -212,6 +218,7 @@ impl Run {
             replay: Replay::new(settings.replay),
             settings,
             world,
+            averaged_actor: learner.actor().to_vec(),
             learner,
             flights: Vec::new(),
             next_mission: 0,
@@ -274,6 +281,9 @@ impl Run {
         };
         let losses = self.learner.update(&self.settings, rates, &transitions, &preferences);
         self.update += 1;
+        // A plain mean at first, so that the untrained start is soon forgotten.
+        let share = AVERAGING.max(1.0 / self.update as f32);
+        net::polyak(&mut self.averaged_actor, self.learner.actor(), share);
         Ok(losses)
     }
 
@@ -303,20 +313,20 @@ impl Run {
         Ok(())
     }
 
-    /// Judges the actor on the validation realizations and remembers it if it is the best so far.
+    /// Judges the averaged actor on the validation realizations and remembers it if it is the best so far.
     ///
     /// # Errors
     /// The network's answer is not a number: the run diverged.
     pub fn validate(&mut self, losses: Losses) -> Result<Progress, TrainError> {
         let mut progress = Progress { update: self.update, steps: self.steps, losses, tables: Vec::new() };
         for (kind, realizations) in &self.validation {
-            let mut network = Network::new(Shape::actor(), self.learner.actor());
+            let mut network = Network::new(Shape::actor(), &self.averaged_actor);
             let table = evaluate(&self.world, realizations, &mut network)?;
             progress.tables.push((kind.name().to_owned(), table));
         }
         let score = progress.score();
         if self.best.as_ref().is_none_or(|best| score > best.score) {
-            let actor = self.learner.actor().to_vec();
+            let actor = self.averaged_actor.clone();
             self.best = Some(Best { actor, update: self.update, steps: self.steps, score });
         }
         Ok(progress)
@@ -338,6 +348,7 @@ impl Run {
             update: self.update,
             steps: self.steps,
             best: self.best.clone(),
+            averaged_actor: self.averaged_actor.clone(),
         };
         Ok(checkpoint::save(&folder.join(CHECKPOINT), &stored)?)
     }
@@ -350,7 +361,7 @@ impl Run {
 pub fn trained(folder: &Path) -> Result<Trained, TrainError> {
     let stored: Stored = checkpoint::load(&folder.join(CHECKPOINT))?;
     let best = stored.best.unwrap_or_else(|| Best {
-        actor: stored.learner.actor().to_vec(),
+        actor: stored.averaged_actor,
         update: stored.update,
         steps: stored.steps,
         score: f64::NAN,
