@@ -59,7 +59,8 @@ impl Greedy {
     }
 }
 
-fn approach(from: Cell, to: Cell) -> Option<Action> {
+/// The move along the axis with more cells to go; `None` when there.
+pub(crate) fn approach(from: Cell, to: Cell) -> Option<Action> {
     let (east, north) = (to.x - from.x, to.y - from.y);
     if east == 0 && north == 0 {
         None

@@ -15,6 +15,7 @@
 //! [`export`] writes the model. The network itself is [`net`].
 
 pub mod checkpoint;
+pub mod distil;
 pub mod evaluation;
 pub mod export;
 pub mod flight;
@@ -23,6 +24,7 @@ pub mod mosac;
 pub mod net;
 pub mod observation;
 pub mod pareto;
+pub mod planner;
 pub mod replay;
 pub mod settings;
 pub mod train;

@@ -19,6 +19,8 @@ use thiserror::Error;
 
 /// The checkpoint's name inside the output folder.
 pub const CHECKPOINT: &str = "run.checkpoint";
+/// The best parameters' name inside the output folder.
+pub const LEARNED: &str = "learned.checkpoint";
 /// The learning curve's name inside the output folder: one JSON object a line.
 pub const CURVE: &str = "curve.jsonl";
 /// Realizations that choose the best parameters have numbers from here on; those that judge count from 0.
@@ -51,30 +53,77 @@ pub enum TrainError {
     },
 }
 
-/// What a run tells while it goes on.
+/// What a run tells while it goes on: one line of the learning curve.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Progress {
+pub struct Progress<L> {
     /// Updates done.
     pub update: u64,
     /// Slots flown.
     pub steps: u64,
     /// Of the last update.
-    pub losses: Losses,
-    /// Per scenario that is trained: name and validation table.
-    pub tables: Vec<(String, Table)>,
+    pub losses: L,
+    /// On the validation realizations.
+    pub tables: Tables,
 }
 
-impl Progress {
+/// Per scenario that is trained: name and validation table.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Tables(pub Vec<(String, Table)>);
+
+impl Tables {
     /// What the best parameters are chosen by: the mean hypervolume over the scenarios.
     #[must_use]
     pub fn score(&self) -> f64 {
-        self.tables.iter().map(|(_, table)| table.hypervolume).sum::<f64>() / self.tables.len().max(1) as f64
+        self.0.iter().map(|(_, table)| table.hypervolume).sum::<f64>() / self.0.len().max(1) as f64
     }
 }
 
-/// The parameters with the best validation so far.
+/// The realizations that choose the best parameters: other ones than those that are trained on and those that judge.
+#[derive(Clone, Debug)]
+pub struct Validation(Vec<(ScenarioKind, Vec<(Seed, Realization)>)>);
+
+impl Validation {
+    /// Those of the scenarios that the settings train.
+    ///
+    /// # Errors
+    /// The scenario does not fit the city.
+    pub fn draw(world: &World, settings: &Settings) -> Result<Validation, ScenarioError> {
+        let shares = [settings.share_rd, settings.share_rb];
+        let trained = ScenarioKind::ALL.into_iter().zip(shares).filter(|(_, share)| *share > 0.0);
+        trained
+            .map(|(kind, _)| {
+                let numbers = VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT;
+                let drawn = numbers.map(|number| {
+                    let seed = Seed::evaluation(number);
+                    Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))
+                });
+                Ok((kind, drawn.collect::<Result<_, ScenarioError>>()?))
+            })
+            .collect::<Result<_, _>>()
+            .map(Validation)
+    }
+
+    /// The paper's metrics of an actor on them.
+    ///
+    /// # Errors
+    /// The network's answer is not a number: the run diverged.
+    pub fn judge(&self, world: &Arc<World>, actor: &[f32]) -> Result<Tables, DeciderError> {
+        let table = |(kind, realizations): &(ScenarioKind, Vec<(Seed, Realization)>)| {
+            let mut network = Network::new(Shape::actor(), actor);
+            Ok((kind.name().to_owned(), evaluate(world, realizations, &mut network)?))
+        };
+        self.0.iter().map(table).collect::<Result<_, _>>().map(Tables)
+    }
+}
+
+/// The best parameters of a run by validation, and how they came about: what `evaluate` and `export` read.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Best {
+pub struct Learned {
+    /// The command that made them: `train` or `distil`.
+    pub method: String,
+    /// Its settings.
+    pub settings: Settings,
     /// The actor.
     pub actor: Vec<f32>,
     /// Update at which it was found.
@@ -83,6 +132,25 @@ pub struct Best {
     pub steps: u64,
     /// Mean hypervolume on the validation realizations.
     pub score: f64,
+}
+
+impl Learned {
+    /// Reads what a run in `folder` has learned so far; `None` before its first validation.
+    ///
+    /// # Errors
+    /// The file is damaged.
+    pub fn load(folder: &Path) -> Result<Option<Learned>, CheckpointError> {
+        let path = folder.join(LEARNED);
+        if path.exists() { checkpoint::load(&path).map(Some) } else { Ok(None) }
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// The disk; the last good file is then still there.
+    pub fn save(&self, folder: &Path) -> Result<(), CheckpointError> {
+        checkpoint::save(&folder.join(LEARNED), self)
+    }
 }
 
 /// A run: everything that the next update depends on.
@@ -96,9 +164,8 @@ pub struct Run {
     rng: ChaCha8Rng,
     update: u64,
     steps: u64,
-    best: Option<Best>,
     averaged_actor: Vec<f32>,
-    validation: Vec<(ScenarioKind, Vec<(Seed, Realization)>)>,
+    validation: Validation,
 }
 
 /// A flight in the air, and how it came there: the checkpoint keeps the way, not the place.
@@ -132,19 +199,7 @@ struct Stored {
     rng_word: u128,
     update: u64,
     steps: u64,
-    best: Option<Best>,
     averaged_actor: Vec<f32>,
-}
-
-/// What `evaluate` and `export` need of a checkpoint.
-#[derive(Clone, Debug)]
-pub struct Trained {
-    /// How it was made.
-    pub settings: Settings,
-    /// The best parameters; those of the last update before the first validation.
-    pub best: Best,
-    /// Updates done when the checkpoint was written.
-    pub update: u64,
 }
 
 impl Run {
@@ -184,7 +239,6 @@ impl Run {
         run.next_mission = stored.next_mission;
         run.update = stored.update;
         run.steps = stored.steps;
-        run.best = stored.best;
         run.averaged_actor = stored.averaged_actor;
         for (mission, actions) in stored.flights {
             let mut going = run.begin(mission)?;
@@ -199,21 +253,7 @@ impl Run {
 
     fn assemble(settings: Settings, learner: Learner, rng: ChaCha8Rng) -> Result<Run, TrainError> {
         let world = Arc::new(World::default_world());
-        let mut validation = Vec::new();
-        for (kind, share) in [
-            (ScenarioKind::ReachDestination, settings.share_rd),
-            (ScenarioKind::ReturnBase, settings.share_rb),
-        ] {
-            if share > 0.0 {
-                let drawn = (VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT)
-                    .map(|number| {
-                        let seed = Seed::evaluation(number);
-                        Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))
-                    })
-                    .collect::<Result<_, ScenarioError>>()?;
-                validation.push((kind, drawn));
-            }
-        }
+        let validation = Validation::draw(&world, &settings)?;
         Ok(Run {
             replay: Replay::new(settings.replay),
             settings,
@@ -225,7 +265,6 @@ impl Run {
             rng,
             update: 0,
             steps: 0,
-            best: None,
             validation,
         })
     }
@@ -313,23 +352,28 @@ impl Run {
         Ok(())
     }
 
-    /// Judges the averaged actor on the validation realizations and remembers it if it is the best so far.
+    /// Judges the averaged actor on the validation realizations, and puts it into `best` if it is better.
     ///
     /// # Errors
     /// The network's answer is not a number: the run diverged.
-    pub fn validate(&mut self, losses: Losses) -> Result<Progress, TrainError> {
-        let mut progress = Progress { update: self.update, steps: self.steps, losses, tables: Vec::new() };
-        for (kind, realizations) in &self.validation {
-            let mut network = Network::new(Shape::actor(), &self.averaged_actor);
-            let table = evaluate(&self.world, realizations, &mut network)?;
-            progress.tables.push((kind.name().to_owned(), table));
+    pub fn validate(
+        &self,
+        losses: Losses,
+        best: &mut Option<Learned>,
+    ) -> Result<Progress<Losses>, TrainError> {
+        let tables = self.validation.judge(&self.world, &self.averaged_actor)?;
+        let score = tables.score();
+        if best.as_ref().is_none_or(|best| score > best.score) {
+            *best = Some(Learned {
+                method: "train".into(),
+                settings: self.settings.clone(),
+                actor: self.averaged_actor.clone(),
+                update: self.update,
+                steps: self.steps,
+                score,
+            });
         }
-        let score = progress.score();
-        if self.best.as_ref().is_none_or(|best| score > best.score) {
-            let actor = self.averaged_actor.clone();
-            self.best = Some(Best { actor, update: self.update, steps: self.steps, score });
-        }
-        Ok(progress)
+        Ok(Progress { update: self.update, steps: self.steps, losses, tables })
     }
 
     /// Writes everything that the next update depends on.
@@ -347,26 +391,10 @@ impl Run {
             rng_word: self.rng.get_word_pos(),
             update: self.update,
             steps: self.steps,
-            best: self.best.clone(),
             averaged_actor: self.averaged_actor.clone(),
         };
         Ok(checkpoint::save(&folder.join(CHECKPOINT), &stored)?)
     }
-}
-
-/// Reads what was learned out of the checkpoint in `folder`.
-///
-/// # Errors
-/// There is none, or it is damaged.
-pub fn trained(folder: &Path) -> Result<Trained, TrainError> {
-    let stored: Stored = checkpoint::load(&folder.join(CHECKPOINT))?;
-    let best = stored.best.unwrap_or_else(|| Best {
-        actor: stored.averaged_actor,
-        update: stored.update,
-        steps: stored.steps,
-        score: f64::NAN,
-    });
-    Ok(Trained { settings: stored.settings, best, update: stored.update })
 }
 
 fn mix(start: f32, end: f32, progress: f32) -> f32 {

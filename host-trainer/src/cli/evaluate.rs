@@ -1,12 +1,12 @@
 //! `gleaner-train evaluate`.
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::train::trained;
+use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{ScenarioKind, World};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 #[derive(Debug, clap::Args)]
@@ -47,8 +47,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let drawn = realizations(&world, &scenario, arguments.realizations)?;
     let mut systems = vec![("GREEDY".to_owned(), evaluate_greedy(&world, &drawn))];
     if let Some(folder) = &arguments.run {
-        let trained = trained(folder)?;
-        let mut network = Network::new(Shape::actor(), &trained.best.actor);
+        let learned = learned(folder)?;
+        let mut network = Network::new(Shape::actor(), &learned.actor);
         systems.push((format!("{}", folder.display()), evaluate(&world, &drawn, &mut network)?));
     }
     if let Some(path) = &arguments.model {
@@ -71,6 +71,16 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// The best parameters of the run in `folder`.
+pub fn learned(folder: &Path) -> Result<Learned> {
+    Learned::load(folder)?.with_context(|| {
+        format!(
+            "{}: no run has been validated here yet; wait for its first line or check --run",
+            folder.display()
+        )
+    })
 }
 
 /// The table as Markdown, for people and for model cards.

@@ -1,13 +1,13 @@
 //! `gleaner-train export`.
 
-use super::evaluate::render;
+use super::evaluate::{learned, render};
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{Engine, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::train::{Trained, trained};
+use gleaner_host_trainer::train::Learned;
 use gleaner_policy::Tokens;
 use gleaner_policy::onnx::TractPolicy;
 use gleaner_units::BatteryUnits;
@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
         bail!("--realizations 0: a card without measurements is no card; give at least 1");
     }
-    let trained = trained(&arguments.run)?;
+    let learned = learned(&arguments.run)?;
     let world = Arc::new(World::default_world());
     let commit = match &arguments.commit {
         Some(commit) => commit.clone(),
@@ -54,18 +54,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         name: arguments.name.clone(),
         version: env!("CARGO_PKG_VERSION").into(),
         commit,
-        command: train_command(&trained.settings),
-        seed: trained.settings.seed,
-        steps: trained.best.steps,
-        scenario: scenario_name(&trained.settings),
+        command: command(&learned),
+        seed: learned.settings.seed,
+        steps: learned.steps,
+        scenario: scenario_name(&learned.settings),
         city_hash: world.city().fingerprint(),
     };
-    let (shape, actor) = (Shape::actor(), &trained.best.actor);
+    let (shape, actor) = (Shape::actor(), &learned.actor);
     let goldens = golden_pairs(actor, shape, &golden_observations(&world)?);
     let bytes = export(actor, shape, &card, &goldens)?;
     // What is shipped is what is measured: the written bytes, in the engine that flies them.
     let mut policy = TractPolicy::load_checked(&bytes).context("the exported model fails its own test")?;
-    let text = card_text(&card, &trained, &mut policy, &world, arguments)?;
+    let text = card_text(&card, &learned, &mut policy, &world, arguments)?;
     write_whole(&arguments.model, &bytes)?;
     let card_path = arguments.model.with_extension("md");
     write_whole(&card_path, text.as_bytes())?;
@@ -100,7 +100,7 @@ fn golden_observations(world: &Arc<World>) -> Result<Vec<Tokens>> {
 
 fn card_text(
     card: &ModelCard,
-    trained: &Trained,
+    learned: &Learned,
     policy: &mut TractPolicy,
     world: &Arc<World>,
     arguments: &Arguments,
@@ -118,7 +118,7 @@ fn card_text(
         text,
         "| steps | {} slots flown, {} updates: the best of {} updates by mean hypervolume on 60 validation \
          realizations |",
-        card.steps, trained.best.update, trained.update
+        card.steps, learned.update, learned.settings.updates
     )?;
     writeln!(text, "| trained in | {} |", card.scenario)?;
     writeln!(text, "| city hash | `{:#018x}` |", card.city_hash)?;
@@ -179,9 +179,10 @@ fn scenario_name(settings: &Settings) -> String {
 }
 
 /// The command that trains it again: every setting that is not at its default.
-fn train_command(settings: &Settings) -> String {
+fn command(learned: &Learned) -> String {
     use clap::Args as _;
-    let mut command = String::from("gleaner-train train --out RUN");
+    let settings = &learned.settings;
+    let mut command = format!("gleaner-train {} --out RUN", learned.method);
     let all = serde_json::to_value(settings).unwrap_or_default();
     let described = Settings::augment_args(clap::Command::new("train"));
     for argument in described.get_arguments() {

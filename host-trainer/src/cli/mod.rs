@@ -19,6 +19,9 @@ pub struct Arguments {
 enum Command {
     /// Train a policy; goes on from the last checkpoint in --out if there is one.
     Train(train::Arguments),
+    /// Teach a policy what a planner with full knowledge does; resumes like train. Of the settings it uses the
+    /// missions, the batch (batch x preferences lessons), the replay size and the learning rates.
+    Distil(train::Arguments),
     /// Print the paper's metrics of a model, a checkpoint and GREEDY.
     Evaluate(evaluate::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
@@ -28,6 +31,7 @@ enum Command {
 pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.command {
         Command::Train(arguments) => train::run(arguments),
+        Command::Distil(arguments) => train::distil(arguments),
         Command::Evaluate(arguments) => evaluate::run(arguments),
         Command::Export(arguments) => export::run(arguments),
     }

@@ -1,10 +1,11 @@
-//! `gleaner-train train`.
+//! `gleaner-train train` and `gleaner-train distil`.
 
 use anyhow::{Context, Result};
+use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::train::{CURVE, Progress, Run};
+use gleaner_host_trainer::train::{CURVE, Learned, Run, Tables};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::fs::{self, OpenOptions};
+use std::fs::{self, File, OpenOptions};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
@@ -23,67 +24,124 @@ pub struct Arguments {
     settings: Settings,
 }
 
+/// Learns by trial: MOSAC.
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let out = &arguments.out;
-    fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
-    let mut run = Run::open(arguments.settings.clone(), out)?;
-    let curve_path = out.join(CURVE);
-    let mut curve = OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(&curve_path)
-        .with_context(|| curve_path.display().to_string())?;
-
-    let bar = bar(arguments.settings.updates, run.update());
+    let mut desk = Desk::open(arguments)?;
+    let mut run = Run::open(arguments.settings.clone(), &arguments.out)?;
+    desk.begin(run.update());
     while !run.is_done() {
         let losses = run.advance()?;
-        bar.set_position(run.update());
-        if run.update() % arguments.validate_every == 0 || run.is_done() {
-            let progress = run.validate(losses)?;
-            writeln!(curve, "{}", serde_json::to_string(&progress)?)
-                .with_context(|| curve_path.display().to_string())?;
-            report(&bar, &progress);
+        desk.bar.set_position(run.update());
+        if desk.validation_is_due(run.update()) {
+            let progress = run.validate(losses, &mut desk.best)?;
+            let of_losses = format!(
+                "critic {:.4}  entropy {:.3}  nu {:.5}",
+                losses.critic, losses.entropy, losses.entropy_weight
+            );
+            desk.report(&serde_json::to_value(&progress)?, run.update(), &of_losses, &progress.tables)?;
         }
-        if run.update() % arguments.checkpoint_every == 0 || run.is_done() {
-            run.save(out)?;
+        if desk.checkpoint_is_due(run.update()) {
+            run.save(&arguments.out)?;
         }
     }
-    bar.abandon();
-    println!("trained {} updates; next: gleaner-train export --run {}", run.update(), out.display());
+    desk.end();
     Ok(())
 }
 
-fn bar(updates: u64, done: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} updates, {per_sec}, {eta} left {msg}");
-    let bar = ProgressBar::new(updates);
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.reset_eta();
-    bar.set_position(done);
-    bar.reset_eta();
-    bar
+/// Learns from the planner: distillation.
+pub fn distil(arguments: &Arguments) -> Result<()> {
+    let mut desk = Desk::open(arguments)?;
+    let mut run = Distillation::open(arguments.settings.clone(), &arguments.out)?;
+    desk.begin(run.update());
+    while !run.is_done() {
+        let cross_entropy = run.advance()?;
+        desk.bar.set_position(run.update());
+        if desk.validation_is_due(run.update()) {
+            let tables = run.validate(&mut desk.best)?;
+            let line = serde_json::json!({
+                "update": run.update(), "cross_entropy": cross_entropy, "tables": &tables,
+            });
+            desk.report(&line, run.update(), &format!("cross entropy {cross_entropy:.4}"), &tables)?;
+        }
+        if desk.checkpoint_is_due(run.update()) {
+            run.save(&arguments.out)?;
+        }
+    }
+    desk.end();
+    Ok(())
 }
 
-/// One line per validation, whether or not anyone watches the bar.
-fn report(bar: &ProgressBar, progress: &Progress) {
-    let mut line = format!(
-        "update {:>7}  steps {:>8}  critic {:.4}  entropy {:.3}  nu {:.5}",
-        progress.update,
-        progress.steps,
-        progress.losses.critic,
-        progress.losses.entropy,
-        progress.losses.entropy_weight
-    );
-    for (scenario, table) in &progress.tables {
-        line += &format!(
-            "  {scenario}: hypervolume {:.0}  coverage {:.1} %  least energy {:.2}",
-            table.hypervolume,
-            table.coverage(),
-            table.least_energy()
-        );
+/// What both ways of learning show and leave in the folder.
+struct Desk<'a> {
+    arguments: &'a Arguments,
+    bar: ProgressBar,
+    curve: File,
+    best: Option<Learned>,
+}
+
+impl<'a> Desk<'a> {
+    fn open(arguments: &'a Arguments) -> Result<Desk<'a>> {
+        let out = &arguments.out;
+        fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
+        let path = out.join(CURVE);
+        let curve = OpenOptions::new().create(true).append(true).open(&path);
+        let curve = curve.with_context(|| path.display().to_string())?;
+        let best = Learned::load(out)?;
+        Ok(Desk { arguments, bar: bar(arguments.settings.updates), curve, best })
     }
-    if std::io::stderr().is_terminal() {
-        bar.println(line);
-    } else {
-        println!("{line}");
+
+    fn begin(&self, update: u64) {
+        self.bar.set_position(update);
+        self.bar.reset_eta();
     }
+
+    fn validation_is_due(&self, update: u64) -> bool {
+        update % self.arguments.validate_every == 0 || update == self.arguments.settings.updates
+    }
+
+    fn checkpoint_is_due(&self, update: u64) -> bool {
+        update % self.arguments.checkpoint_every == 0 || update == self.arguments.settings.updates
+    }
+
+    /// One line of the curve and one for people, whether or not anyone watches the bar; keeps the best.
+    fn report(
+        &mut self,
+        curve: &serde_json::Value,
+        update: u64,
+        losses: &str,
+        tables: &Tables,
+    ) -> Result<()> {
+        writeln!(self.curve, "{curve}").context("the learning curve cannot be written")?;
+        if let Some(best) = self.best.as_ref().filter(|best| best.update == update) {
+            best.save(&self.arguments.out)?;
+        }
+        let mut line = format!("update {update:>7}  {losses}");
+        for (scenario, table) in &tables.0 {
+            line += &format!(
+                "  {scenario}: hypervolume {:.0}  coverage {:.1} %  least energy {:.2}",
+                table.hypervolume,
+                table.coverage(),
+                table.least_energy()
+            );
+        }
+        if std::io::stderr().is_terminal() {
+            self.bar.println(line);
+        } else {
+            println!("{line}");
+        }
+        Ok(())
+    }
+
+    fn end(&self) {
+        self.bar.abandon();
+        let out = self.arguments.out.display();
+        println!("done; next: gleaner-train export --run {out} --model models/mine.onnx");
+    }
+}
+
+fn bar(updates: u64) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} updates, {per_sec}, {eta} left");
+    let bar = ProgressBar::new(updates);
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
 }

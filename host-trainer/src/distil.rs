@@ -1,0 +1,253 @@
+//! Distillation: the actor learns to do what a planner that knows everything would do, from what it can see.
+//!
+//! The learner flies and the planner says at every slot what it would have done (DAgger: Ross, Gordon and Bagnell
+//! 2011), so the learner is taught in the states that it gets itself into. The loss is the cross entropy of the
+//! planner's action under the masked policy.
+
+use crate::checkpoint::{self, CheckpointError};
+use crate::evaluation::Network;
+use crate::flight::Flight;
+use crate::mosac::Distribution;
+use crate::net::{self, Adam, Batch, Shape, Workspace};
+use crate::observation::Observation;
+use crate::planner::{KnownMission, Planner};
+use crate::settings::Settings;
+use crate::train::{Learned, TrainError, Validation};
+use gleaner_policy::Preference;
+use gleaner_units::{Action, ActionMask};
+use gleaner_world::World;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::Arc;
+
+/// The checkpoint's name inside the output folder.
+pub const CHECKPOINT: &str = "distil.checkpoint";
+/// Missions in the air at once.
+const FLIGHTS: usize = 16;
+/// Lessons before the first update.
+const WARM_UP: usize = 2_000;
+/// Updates over which the planner hands the controls to the learner.
+const HAND_OVER: u64 = 2_000;
+/// Share of the actor that its running average takes over per update.
+const AVERAGING: f32 = 0.001;
+
+/// A state and what the planner did in it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Lesson {
+    seen: Observation,
+    preference: Preference,
+    mask: ActionMask,
+    action: Action,
+}
+
+/// A run of distillation.
+pub struct Distillation {
+    settings: Settings,
+    world: Arc<World>,
+    planner: Planner,
+    flights: Vec<(Flight, KnownMission)>,
+    kept: Kept,
+    gradients: Vec<f32>,
+    batch: Batch,
+    workspace: Workspace,
+    rng: ChaCha8Rng,
+    validation: Validation,
+}
+
+/// What the checkpoint keeps. Flights in the air begin anew after a kill.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    settings: Settings,
+    actor: Vec<f32>,
+    averaged: Vec<f32>,
+    adam: Adam,
+    lessons: Vec<Lesson>,
+    next_lesson: usize,
+    next_mission: u64,
+    update: u64,
+    steps: u64,
+    rng_word: u128,
+}
+
+impl Distillation {
+    /// Goes on from the checkpoint in `folder`, or starts anew.
+    ///
+    /// # Errors
+    /// The checkpoint is damaged or of another run; no mission could be drawn.
+    pub fn open(settings: Settings, folder: &Path) -> Result<Distillation, TrainError> {
+        let path = folder.join(CHECKPOINT);
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+        let kept = if path.exists() {
+            let kept: Kept = checkpoint::load(&path)?;
+            if kept.settings != settings {
+                return Err(TrainError::OtherSettings { path });
+            }
+            rng.set_word_pos(kept.rng_word);
+            kept
+        } else {
+            let actor = Shape::actor().initialise(&mut rng);
+            Kept {
+                averaged: actor.clone(),
+                adam: Adam::new(actor.len(), 0.0),
+                actor,
+                lessons: Vec::new(),
+                next_lesson: 0,
+                next_mission: 0,
+                update: 0,
+                steps: 0,
+                rng_word: 0,
+                settings: settings.clone(),
+            }
+        };
+        let world = Arc::new(World::default_world());
+        let mut run = Distillation {
+            planner: Planner::new(Arc::clone(&world)),
+            validation: Validation::draw(&world, &settings)?,
+            settings,
+            world,
+            flights: Vec::new(),
+            kept,
+            gradients: Vec::new(),
+            batch: Batch::new(),
+            workspace: Workspace::new(),
+            rng,
+        };
+        for _ in 0..FLIGHTS {
+            let flight = run.next_flight()?;
+            run.flights.push(flight);
+        }
+        Ok(run)
+    }
+
+    fn next_flight(&mut self) -> Result<(Flight, KnownMission), TrainError> {
+        let mission = self.settings.mission(&self.world, self.kept.next_mission)?;
+        self.kept.next_mission += 1;
+        let flight = Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)?;
+        Ok((flight, self.planner.study(&mission.realization)))
+    }
+
+    /// Updates done.
+    #[must_use]
+    pub const fn update(&self) -> u64 {
+        self.kept.update
+    }
+
+    /// Whether the settings ask for no more updates.
+    #[must_use]
+    pub const fn is_done(&self) -> bool {
+        self.kept.update >= self.settings.updates
+    }
+
+    /// One slot of every flight, if lessons are due, and one update. Gives the cross entropy, nats.
+    ///
+    /// # Errors
+    /// No mission could be drawn.
+    pub fn advance(&mut self) -> Result<f32, TrainError> {
+        while self.kept.lessons.len() < WARM_UP {
+            self.fly()?;
+        }
+        // As many slots per update as the settings say, in rounds of all flights.
+        if self.kept.update % (FLIGHTS / self.settings.steps_per_update).max(1) as u64 == 0 {
+            self.fly()?;
+        }
+        let loss = self.learn();
+        self.kept.update += 1;
+        let share = AVERAGING.max(1.0 / self.kept.update as f32);
+        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
+        Ok(loss)
+    }
+
+    /// Every flight is shown to the planner; the learner, or at first the planner, decides.
+    fn fly(&mut self) -> Result<(), TrainError> {
+        let seen: Vec<Observation> = self.flights.iter().map(|(flight, _)| flight.observe()).collect();
+        let inputs = self.flights.iter().zip(&seen).map(|((flight, _), seen)| seen.with(flight.preference()));
+        let logits = Network::new(Shape::actor(), &self.kept.actor).logits(inputs);
+        let learner_flies = (self.kept.update as f64 / HAND_OVER as f64).min(0.9);
+        for (index, (seen, logits)) in seen.into_iter().zip(logits).enumerate() {
+            let (flight, known) = &mut self.flights[index];
+            let (mask, preference) = (flight.mask(), flight.preference());
+            let advice = known.advise(flight);
+            let own = Distribution::new(&logits, mask).pick(self.rng.random());
+            let action = if self.rng.random_bool(learner_flies) { own } else { advice };
+            flight.step(action);
+            self.kept.steps += 1;
+            let lesson = Lesson { seen, preference, mask, action: advice };
+            if self.kept.lessons.len() < self.settings.replay {
+                self.kept.lessons.push(lesson);
+            } else {
+                self.kept.lessons[self.kept.next_lesson] = lesson;
+            }
+            self.kept.next_lesson = (self.kept.next_lesson + 1) % self.settings.replay;
+            if flight.is_over() {
+                self.flights[index] = self.next_flight()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn learn(&mut self) -> f32 {
+        let count = self.settings.batch * self.settings.preferences;
+        let lessons: Vec<&Lesson> = (0..count)
+            .map(|_| &self.kept.lessons[self.rng.random_range(0..self.kept.lessons.len())])
+            .collect();
+        self.batch.clear();
+        for lesson in &lessons {
+            self.batch.push_sample(&lesson.seen.with(lesson.preference));
+        }
+        self.gradients.clear();
+        self.gradients.resize(self.kept.actor.len(), 0.0);
+        let scale = 1.0 / count as f32;
+        let mut loss = 0.0;
+        net::forward_backward(
+            &Shape::actor(),
+            &self.kept.actor,
+            &self.batch,
+            &mut self.workspace,
+            |range, outputs, gradients| {
+                let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
+                for ((logits, gradients), lesson) in rows.zip(&lessons[range]) {
+                    let policy = Distribution::new(logits, lesson.mask);
+                    let taught = lesson.action.index();
+                    loss -= scale * policy.log_probability[taught];
+                    *gradients = policy.probability.map(|probability| scale * probability);
+                    gradients[taught] -= scale;
+                }
+            },
+            &mut self.gradients,
+        );
+        self.kept.adam.lr = self.settings.learning_rate_at(self.kept.update);
+        self.kept.adam.step(&mut self.kept.actor, &self.gradients);
+        loss
+    }
+
+    /// Judges the averaged actor, and offers it to `best`.
+    ///
+    /// # Errors
+    /// The network's answer is not a number.
+    pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<crate::train::Tables, TrainError> {
+        let tables = self.validation.judge(&self.world, &self.kept.averaged)?;
+        let score = tables.score();
+        if best.as_ref().is_none_or(|best| score > best.score) {
+            *best = Some(Learned {
+                method: "distil".into(),
+                settings: self.settings.clone(),
+                actor: self.kept.averaged.clone(),
+                update: self.kept.update,
+                steps: self.kept.steps,
+                score,
+            });
+        }
+        Ok(tables)
+    }
+
+    /// Writes the checkpoint.
+    ///
+    /// # Errors
+    /// The disk; the last good checkpoint is then still there.
+    pub fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
+        self.kept.rng_word = self.rng.get_word_pos();
+        checkpoint::save(&folder.join(CHECKPOINT), &self.kept)
+    }
+}

@@ -1,0 +1,89 @@
+//! What the shipped policy must do in the simulated city, through the program that people run.
+
+use gleaner_tests::programs;
+use serde_json::Value;
+use std::process::Command;
+
+/// Seeds of the comparison with GREEDY.
+const SEEDS: u64 = 20;
+
+fn fly(arguments: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(programs::path("gleaner-sitl"))
+        .current_dir(programs::repository())
+        .args(["fly", "--json", "--out"])
+        .arg(folder.path())
+        .args(arguments)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "gleaner-sitl fly {arguments:?}: {said}");
+    for file in ["trajectory.svg", "flight.tlog", "decisions.jsonl"] {
+        assert!(folder.path().join(file).metadata().unwrap().len() > 1000, "{file} of {arguments:?}");
+    }
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn the_object_has_the_contract_s_keys() {
+    let report = fly(&["--scenario", "rd", "--preference", "0.5", "--seed", "4", "--switch", "60:0"]);
+    let mut keys: Vec<&str> = report.as_object().unwrap().keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    let contract = [
+        "collected",
+        "decisions",
+        "devices",
+        "energy",
+        "engine",
+        "landed",
+        "model",
+        "preference",
+        "scenario",
+        "seed",
+        "switches",
+        "violations",
+        "wall_s",
+    ];
+    assert_eq!(keys, contract);
+    assert_eq!(report["switches"], 1);
+    assert_eq!(report["engine"], "tract");
+}
+
+#[test]
+fn for_energy_alone_the_shortest_way_is_flown() {
+    for seed in ["1", "2", "3"] {
+        let direct = fly(&["--scenario", "rd", "--preference", "0", "--seed", seed]);
+        assert_eq!((&direct["energy"], &direct["decisions"]), (&32.0.into(), &32.into()), "{direct}");
+        let around = fly(&["--scenario", "rb", "--preference", "0", "--seed", seed]);
+        assert_eq!((&around["energy"], &around["decisions"]), (&2.0.into(), &2.into()), "{around}");
+    }
+}
+
+/// The mean of 20 seeds, flown through MAVLink, against GREEDY on the same realizations on the grid.
+#[test]
+fn for_data_alone_more_is_collected_than_greedy_does() {
+    for scenario in ["rd", "rb"] {
+        let mut sum = 0.0;
+        for seed in 0..SEEDS {
+            let report = fly(&["--scenario", scenario, "--preference", "1", "--seed", &seed.to_string()]);
+            assert_eq!((&report["landed"], &report["violations"]), (&true.into(), &0.into()), "{report}");
+            assert!(report["energy"].as_f64().unwrap() <= 80.0, "{report}");
+            sum += report["collected"].as_f64().unwrap();
+        }
+        let policy = 100.0 * sum / SEEDS as f64;
+        let greedy = greedy_percent(scenario);
+        println!("{scenario}: policy {policy:.1} %, GREEDY {greedy:.1} %, mean of {SEEDS} seeds");
+        assert!(policy > greedy, "{scenario}: policy {policy:.1} %, GREEDY {greedy:.1} %");
+    }
+}
+
+fn greedy_percent(scenario: &str) -> f64 {
+    let output = Command::new(programs::path("gleaner-train"))
+        .args(["evaluate", "--json", "--scenario", scenario, "--realizations", &SEEDS.to_string()])
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let tables: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = tables["GREEDY"]["rows"].as_array().unwrap();
+    rows.last().unwrap()["data_percent"].as_f64().unwrap()
+}
