@@ -1,0 +1,31 @@
+//! `gleaner`: the pilot on a Linux companion computer.
+//!
+//! This program wires and reports: it opens ports and files, feeds bytes and the time to
+//! [`gleaner_pilot::Onboard`], and carries its bytes away. Nothing is decided here.
+//!
+//! Exit codes: 0 done, 1 ran but the verdict is negative (`check`), 2 could not run. An error is one line on
+//! stderr: what, where, what to do.
+
+mod args;
+mod check;
+mod clock;
+mod config;
+mod error;
+mod load;
+mod log;
+mod run;
+mod timed;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let outcome = match args::parse() {
+        Ok(args::Command::Run(setup)) => run::run(&setup),
+        Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
+        Err(answered) => return answered,
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("gleaner: {error}");
+        ExitCode::from(2)
+    })
+}

@@ -1,0 +1,206 @@
+//! `gleaner run`: the flight loop.
+//!
+//! Bytes are taken in as they come; every 20 ms the pilot is polled, and what it wants to say is sent. Setpoints
+//! and heartbeat hang off that poll: when this loop stops, both stop, and the autopilot's own failsafes act.
+
+use crate::args::Setup;
+use crate::clock::Clock;
+use crate::config::{self, Config};
+use crate::error::StartError;
+use crate::load;
+use crate::log::DecisionLog;
+use crate::timed::Timed;
+use gleaner_link::Severity;
+use gleaner_pilot::{Onboard, State};
+use gleaner_policy::onnx::TractPolicy;
+use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
+use gleaner_units::Duration as PilotDuration;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Time between polls of the pilot, which wants 20 Hz or more.
+const TICK: Duration = Duration::from_millis(20);
+/// Reads per port and wake-up: a flood on one port must not starve the poll.
+const READS_PER_WAKE: usize = 32;
+/// Longest MAVLink 2 frame: header 10, payload 255, checksum 2, signature 13.
+const FRAME_BYTES: usize = 280;
+
+/// Opens everything, then flies until interrupted.
+///
+/// # Errors
+/// Something could not be opened; nothing was sent then.
+pub fn run(setup: &Setup) -> Result<ExitCode, StartError> {
+    let config = config::resolve(setup)?;
+    let mission = load::mission(&config.mission)?;
+    let engine = load::model(&config.model)?;
+    let model = engine.info().card.name.clone();
+    // The engine reproduced its golden pairs, or it would not have been loaded.
+    let onboard = Onboard::new(mission, config.parameters.clone(), config.settings, Timed::new(engine), Ok(()))
+        .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
+    let log = config.log_dir.as_deref().map(DecisionLog::open).transpose()?;
+    let link = open("autopilot", &config.autopilot)?;
+    let radio = config.radio.as_ref().map(|endpoint| open("radio", endpoint)).transpose()?;
+    let stop = stop_on_interrupt()?;
+    start_messages();
+    introduce(&config, &model, &link, radio.as_ref());
+    let mut flight = Flight { onboard, link, radio, log, clock: Clock::start(), said: State::Boot };
+    flight.fly(&stop);
+    flight.end();
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Opens the port for `role`.
+pub fn open(role: &'static str, endpoint: &gleaner_ports::Endpoint) -> Result<Port, StartError> {
+    Port::open(endpoint).map_err(|source| StartError::Port { role, source })
+}
+
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>, StartError> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).map_err(StartError::Signals)?;
+    Ok(stop)
+}
+
+/// Messages go to stderr from here on; before, stderr holds at most the one line of an error.
+fn start_messages() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
+}
+
+fn introduce(config: &Config, model: &str, link: &Port, radio: Option<&Port>) {
+    tracing::info!("gleaner {} with model {model} ({})", env!("CARGO_PKG_VERSION"), config.model.display());
+    for (role, port) in [("autopilot", Some(link)), ("radio", radio)] {
+        if let Some(port) = port {
+            let at = port.local_address().map_or_else(String::new, |address| format!(", local address {address}"));
+            tracing::info!("{role} port {} is open{at}", port.endpoint());
+        }
+    }
+}
+
+struct Flight {
+    onboard: Onboard<Timed<TractPolicy>>,
+    link: Port,
+    radio: Option<Port>,
+    log: Option<DecisionLog>,
+    clock: Clock,
+    said: State,
+}
+
+impl Flight {
+    fn fly(&mut self, stop: &AtomicBool) {
+        let mut next_tick = Instant::now();
+        while !stop.load(Ordering::Relaxed) {
+            self.hear();
+            let now = Instant::now();
+            if now >= next_tick {
+                self.tick(now);
+                next_tick = (next_tick + TICK).max(now);
+            }
+            self.speak();
+            self.rest(next_tick.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    fn hear(&mut self) {
+        let mut buffer = [0; RECEIVE_BYTES];
+        for _ in 0..READS_PER_WAKE {
+            let bytes = self.link.receive(&mut buffer);
+            if bytes == 0 {
+                break;
+            }
+            self.onboard.receive_link(self.clock.at(Instant::now()), &buffer[..bytes]);
+        }
+        let Some(radio) = &mut self.radio else { return };
+        for _ in 0..READS_PER_WAKE {
+            let bytes = radio.receive(&mut buffer);
+            if bytes == 0 {
+                break;
+            }
+            self.onboard.receive_radio(self.clock.at(Instant::now()), &buffer[..bytes]);
+        }
+    }
+
+    fn tick(&mut self, now: Instant) {
+        self.mend(now);
+        self.onboard.poll(self.clock.at(now));
+        let took = self.onboard.policy().take();
+        if let Some(took) = took {
+            let micros = u64::try_from(took.as_micros()).unwrap_or(u64::MAX);
+            self.onboard.set_inference_time(PilotDuration::from_micros(micros));
+        }
+        if let Some(decision) = self.onboard.decision() {
+            let (cell, action, battery) = (decision.cell, decision.action.name(), decision.battery.0);
+            tracing::debug!("decision {}: {action} at {cell}, battery {battery}", decision.sequence);
+            if let Some(log) = &mut self.log {
+                log.write(decision, took);
+            }
+        }
+        let state = self.onboard.state();
+        if state != self.said {
+            tracing::info!("{} -> {}", self.said.name(), state.name());
+            self.said = state;
+        }
+    }
+
+    /// Says once what went down or came back; a lost port opens again by itself.
+    fn mend(&mut self, now: Instant) {
+        for (role, port) in [("autopilot", Some(&mut self.link)), ("radio", self.radio.as_mut())] {
+            let Some(port) = port else { continue };
+            let Some(state) = port.maintain(now) else { continue };
+            // About the autopilot's own port the operator hears when it is back.
+            match state {
+                PortState::Up => {
+                    tracing::info!("{role} port {} is back", port.endpoint());
+                    self.onboard.say(Severity::Notice, format_args!("gleaner: {role} port is back"));
+                }
+                PortState::Down(reason) => {
+                    tracing::warn!("{role} port {} is down: {reason}: trying to open it again", port.endpoint());
+                    self.onboard.say(Severity::Warning, format_args!("gleaner: {role} port down, retrying"));
+                }
+            }
+        }
+    }
+
+    fn speak(&mut self) {
+        let mut frame = [0; FRAME_BYTES];
+        loop {
+            let bytes = self.onboard.transmit(&mut frame);
+            if bytes == 0 {
+                return;
+            }
+            self.link.send(&frame[..bytes]);
+        }
+    }
+
+    fn rest(&self, at_most: Duration) {
+        let ports = [Some(&self.link), self.radio.as_ref()];
+        let ports: Vec<&Port> = ports.into_iter().flatten().collect();
+        if wait(&ports, at_most).is_err() {
+            // Without the system's help, look at the ports once a tick.
+            std::thread::sleep(at_most);
+        }
+    }
+
+    /// Says goodbye. Nothing is sent after that: to the autopilot, the silence is the message.
+    fn end(mut self) {
+        let decisions = self.onboard.stats().decisions;
+        let flying = matches!(self.onboard.state(), State::Engaged | State::Homing);
+        if flying {
+            self.onboard.say(Severity::Critical, format_args!("gleaner: stopped in flight, take over now"));
+            tracing::warn!(
+                "stopped in flight: ArduPilot holds its last target until somebody takes over, PX4 leaves OFFBOARD"
+            );
+        } else {
+            self.onboard.say(Severity::Warning, format_args!("gleaner: stopped"));
+        }
+        self.tick(Instant::now());
+        self.speak();
+        tracing::info!("stopped after {decisions} decisions: setpoints and heartbeat have ended");
+        if let Some(log) = self.log {
+            log.close();
+        }
+    }
+}
