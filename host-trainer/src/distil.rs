@@ -169,7 +169,8 @@ impl Distillation {
             let (flight, known) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
             let advice = known.advise(flight);
-            let own = Distribution::new(&logits, mask).pick(self.rng.random());
+            // As on board: the states to be taught in are those that the finished policy will see.
+            let own = mask.argmax(&logits).unwrap_or(advice);
             let action = if self.rng.random_bool(learner_flies) { own } else { advice };
             flight.step(action);
             self.kept.steps += 1;
