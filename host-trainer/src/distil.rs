@@ -2,7 +2,7 @@
 //!
 //! The learner flies and the planner says at every slot what it would have done (DAgger: Ross, Gordon and Bagnell
 //! 2011), so the learner is taught in the states that it gets itself into. The loss is the cross entropy of the
-//! planner's action under the masked policy.
+//! planner's distribution under the masked policy.
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::Network;
@@ -33,13 +33,14 @@ const HAND_OVER: u64 = 2_000;
 /// Share of the actor that its running average takes over per update.
 const AVERAGING: f32 = 0.001;
 
-/// A state and what the planner did in it.
+/// A state and what the planner would do in it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Lesson {
     seen: Observation,
     preference: Preference,
     mask: ActionMask,
-    action: Action,
+    /// Probability of each action.
+    taught: [f32; Action::COUNT],
 }
 
 /// A run of distillation.
@@ -168,13 +169,13 @@ impl Distillation {
         for (index, (seen, logits)) in seen.into_iter().zip(logits).enumerate() {
             let (flight, known) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
-            let advice = known.advise(flight);
+            let (advice, taught) = known.teach(flight);
             // As on board: the states to be taught in are those that the finished policy will see.
             let own = mask.argmax(&logits).unwrap_or(advice);
             let action = if self.rng.random_bool(learner_flies) { own } else { advice };
             flight.step(action);
             self.kept.steps += 1;
-            let lesson = Lesson { seen, preference, mask, action: advice };
+            let lesson = Lesson { seen, preference, mask, taught };
             if self.kept.lessons.len() < self.settings.replay {
                 self.kept.lessons.push(lesson);
             } else {
@@ -210,10 +211,11 @@ impl Distillation {
                 let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
                 for ((logits, gradients), lesson) in rows.zip(&lessons[range]) {
                     let policy = Distribution::new(logits, lesson.mask);
-                    let taught = lesson.action.index();
-                    loss -= scale * policy.log_probability[taught];
-                    *gradients = policy.probability.map(|probability| scale * probability);
-                    gradients[taught] -= scale;
+                    for (action, gradient) in gradients.iter_mut().enumerate() {
+                        let taught = lesson.taught[action];
+                        loss -= scale * taught * policy.log_probability[action];
+                        *gradient = scale * (policy.probability[action] - taught);
+                    }
                 }
             },
             &mut self.gradients,

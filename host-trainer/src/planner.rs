@@ -10,6 +10,7 @@
 
 use crate::flight::Flight;
 use crate::greedy::approach;
+use crate::mosac::Distribution;
 use gleaner_guard::Guard;
 use gleaner_policy::Preference;
 use gleaner_units::{Action, Cell, Db, Grid};
@@ -25,6 +26,8 @@ const EMPTY_UNITS: f32 = 5.0;
 
 /// A stop short of the device must hear it at least so well, data units per slot: clear of buildings.
 const NEAR_UNITS: f32 = 300.0;
+/// Utility that makes an action e times less likely to be taught.
+const INDIFFERENCE: f32 = 0.1;
 /// The largest weight of data that is planned with.
 const THRIFT: f32 = 0.9;
 /// Orders of all stops from which the first search begins, each in both directions.
@@ -74,6 +77,19 @@ struct MeanFlight {
     first: Option<Action>,
 }
 
+impl MeanFlight {
+    fn begin(start: &Start<'_>) -> MeanFlight {
+        MeanFlight {
+            cell: start.cell,
+            battery: start.battery,
+            remaining: start.remaining.clone(),
+            collected: 0.0,
+            energy: 0.0,
+            first: None,
+        }
+    }
+}
+
 impl Planner {
     /// Tabulates the channel.
     #[must_use]
@@ -111,13 +127,43 @@ impl Planner {
 }
 
 impl KnownMission {
-    /// The first action of the best tour that is found from where the flight is, inside the guard's mask. Remembers
-    /// the tour, and begins the next search from it.
+    /// The action that begins the best tour that is found from where the flight is, inside the guard's mask.
+    /// Remembers the tour, and begins the next search from it.
     ///
     /// # Panics
     /// When the flight is over.
     #[must_use]
     pub fn advise(&mut self, flight: &Flight) -> Action {
+        self.plan(flight).0
+    }
+
+    /// [`KnownMission::advise`], and what each action is worth when the tour is flown after it: a distribution over
+    /// the allowed actions, in which those that lose nothing share the probability.
+    ///
+    /// # Panics
+    /// When the flight is over.
+    #[must_use]
+    pub fn teach(&mut self, flight: &Flight) -> (Action, [f32; Action::COUNT]) {
+        let (advice, start, devices) = self.plan(flight);
+        let tour = self.tour.clone().unwrap_or_default();
+        let guard = flight.guard();
+        let mut logits = [f32::NEG_INFINITY; Action::COUNT];
+        for action in flight.mask().iter() {
+            let mut next = MeanFlight::begin(&start);
+            self.slot(&mut next, action);
+            let ends = action != Action::Hover && next.cell == guard.terminal();
+            if !ends {
+                self.finish(&mut next, guard, &devices, &tour);
+            }
+            logits[action.index()] = self.utility(&start, &next) / INDIFFERENCE;
+        }
+        // What the search found is the best known, whatever the mean flight of another action promises.
+        let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        logits[advice.index()] = highest;
+        (advice, Distribution::new(&logits, flight.mask()).probability)
+    }
+
+    fn plan<'a>(&mut self, flight: &'a Flight) -> (Action, Start<'a>, Vec<Cell>) {
         let episode = flight.episode();
         let start = Start {
             cell: episode.uav(),
@@ -131,11 +177,12 @@ impl KnownMission {
         let (_, first) = self.fly(&start, &devices, &tour);
         self.tour = Some(tour);
         let mask = flight.mask();
-        first
+        let advice = first
             .filter(|&action| mask.allows(action))
             .or_else(|| flight.guard().homeward(start.cell).filter(|&action| mask.allows(action)))
             .or_else(|| mask.iter().last())
-            .expect("a feasible state has an allowed action")
+            .expect("a feasible state has an allowed action");
+        (advice, start, devices)
     }
 
     /// From the tour of the last slot, or at first from several beginnings: no stop, and all stops in a few orders.
@@ -192,15 +239,13 @@ impl KnownMission {
 
     /// Flies a tour in the mean; its utility `w . (percent, -energy)` and its first action.
     fn fly(&self, start: &Start<'_>, devices: &[Cell], tour: &[Stop]) -> (f32, Option<Action>) {
-        let guard = start.guard;
-        let mut flight = MeanFlight {
-            cell: start.cell,
-            battery: start.battery,
-            remaining: start.remaining.clone(),
-            collected: 0.0,
-            energy: 0.0,
-            first: None,
-        };
+        let mut flight = MeanFlight::begin(start);
+        self.finish(&mut flight, start.guard, devices, tour);
+        (self.utility(start, &flight), flight.first)
+    }
+
+    /// The stops as far as the battery lasts, then home.
+    fn finish(&self, flight: &mut MeanFlight, guard: &Guard, devices: &[Cell], tour: &[Stop]) {
         let distance = |cell: Cell| guard.distance(cell).map_or(f32::INFINITY, f32::from);
         let affordable = |flight: &MeanFlight, action: Action| {
             let next = flight.cell.after(action);
@@ -213,10 +258,10 @@ impl KnownMission {
                     flight.cell.manhattan(devices[device]) <= radius && self.hears(flight.cell, device);
                 let approach = approach(flight.cell, devices[device]).filter(|_| !is_near);
                 let action = approach.unwrap_or(Action::Hover);
-                if !affordable(&flight, action) {
+                if !affordable(flight, action) {
                     break 'tour;
                 }
-                self.slot(&mut flight, action);
+                self.slot(flight, action);
                 // Passing over the terminal would end the mission.
                 if flight.cell == guard.terminal() && action != Action::Hover {
                     break 'tour;
@@ -227,17 +272,19 @@ impl KnownMission {
             // Nothing to visit from a start on the terminal: out and back.
             let out = Action::MOVES.into_iter().find(|&out| distance(flight.cell.after(out)) == 1.0);
             if let Some(out) = out {
-                self.slot(&mut flight, out);
+                self.slot(flight, out);
             }
         }
         while let Some(action) = homeward(guard, flight.cell) {
-            self.slot(&mut flight, action);
+            self.slot(flight, action);
         }
+    }
+
+    fn utility(&self, start: &Start<'_>, flight: &MeanFlight) -> f32 {
         let percent = 100.0 * flight.collected / self.initial_units;
         // Data alone would make every tour that empties the battery alike; thrift finds the better ones.
         let w_data = start.preference.w_data().min(THRIFT);
-        let utility = w_data * percent - (1.0 - w_data) * flight.energy;
-        (utility, flight.first)
+        w_data * percent - (1.0 - w_data) * flight.energy
     }
 
     fn slot(&self, flight: &mut MeanFlight, action: Action) {

@@ -2,7 +2,7 @@
 
 use super::evaluate::{learned, render};
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{Engine, Table, evaluate, evaluate_greedy, realizations};
+use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::net::Shape;
@@ -126,7 +126,8 @@ fn card_text(
     writeln!(
         text,
         "\nMeasured on {} evaluation realizations that were neither trained on nor used to choose parameters, in \
-         the default city, with the exported file in tract; GREEDY on the same realizations. Reproduce one \
+         the default city; K = 6 with the exported file in tract, the others with the trainer's own forward pass, \
+         which agrees with it; GREEDY on the same realizations. Reproduce one \
          setting with\n\n```sh\ncargo run --release -p gleaner-host-trainer -- evaluate --model {} --scenario \
          rd --devices 6 --battery 80\n```",
         arguments.realizations,
@@ -143,7 +144,11 @@ fn card_text(
                 kind.scenario().with_devices(devices).with_battery(BatteryUnits(f32::from(battery)));
             let drawn = realizations(world, &scenario, arguments.realizations)?;
             let greedy = evaluate_greedy(world, &drawn);
-            let table = evaluate(world, &drawn, &mut Engine(policy))?;
+            // The flying engine answers one question at a time, the learner's network a thousand.
+            let table = match devices {
+                6 => evaluate(world, &drawn, &mut Engine(policy))?,
+                _ => evaluate(world, &drawn, &mut Network::new(Shape::actor(), &learned.actor))?,
+            };
             writeln!(summary, "{}", summary_row(kind, devices, battery, &table, &greedy))?;
             if devices == 6 {
                 writeln!(details, "\n## {kind}, K = 6, B = 80\n\n{}", render(&table))?;
