@@ -15,7 +15,7 @@ use crate::settings::Settings;
 use crate::train::{Learned, TrainError, Validation};
 use gleaner_policy::Preference;
 use gleaner_units::{Action, ActionMask};
-use gleaner_world::World;
+use gleaner_world::{Realization, ScenarioKind, World};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,7 @@ struct Lesson {
 
 /// A run of distillation.
 pub struct Distillation {
+    method: String,
     settings: Settings,
     world: Arc<World>,
     planner: Planner,
@@ -73,11 +74,15 @@ struct Kept {
 }
 
 impl Distillation {
-    /// Goes on from the checkpoint in `folder`, or starts anew.
+    /// Goes on from the checkpoint in `folder`, or starts anew, with the actor of `from` if there is one.
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
-    pub fn open(settings: Settings, folder: &Path) -> Result<Distillation, TrainError> {
+    pub fn open(
+        settings: Settings,
+        folder: &Path,
+        from: Option<&Learned>,
+    ) -> Result<Distillation, TrainError> {
         let path = folder.join(CHECKPOINT);
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let kept = if path.exists() {
@@ -88,7 +93,8 @@ impl Distillation {
             rng.set_word_pos(kept.rng_word);
             kept
         } else {
-            let actor = Shape::actor().initialise(&mut rng);
+            let fresh = Shape::actor().initialise(&mut rng);
+            let actor = from.map_or(fresh, |learned| learned.actor.clone());
             Kept {
                 averaged: actor.clone(),
                 adam: Adam::new(actor.len(), 0.0),
@@ -97,7 +103,7 @@ impl Distillation {
                 next_lesson: 0,
                 next_mission: 0,
                 update: 0,
-                steps: 0,
+                steps: from.map_or(0, |learned| learned.steps),
                 rng_word: 0,
                 settings: settings.clone(),
             }
@@ -106,6 +112,11 @@ impl Distillation {
         let mut run = Distillation {
             planner: Planner::new(Arc::clone(&world)),
             validation: Validation::draw(&world, &settings)?,
+            method: from.map_or("distil".into(), |learned| {
+                let before = learned.settings.command_line(&learned.method, "FIRST");
+                let before = before.trim_start_matches("gleaner-train ");
+                format!("{before} && gleaner-train distil --from FIRST")
+            }),
             settings,
             world,
             flights: Vec::new(),
@@ -115,16 +126,23 @@ impl Distillation {
             workspace: Workspace::new(),
             rng,
         };
-        for _ in 0..FLIGHTS {
-            let flight = run.next_flight()?;
+        for index in 0..FLIGHTS {
+            let flight = run.next_flight(index)?;
             run.flights.push(flight);
         }
         Ok(run)
     }
 
-    fn next_flight(&mut self) -> Result<(Flight, KnownMission), TrainError> {
-        let mission = self.settings.mission(&self.world, self.kept.next_mission)?;
+    /// The first of the flights is always out and back for energy alone. It lasts two slots, so among the lessons of
+    /// drawn missions it would hardly be seen, and it must be flown exactly.
+    fn next_flight(&mut self, index: usize) -> Result<(Flight, KnownMission), TrainError> {
+        let mut mission = self.settings.mission(&self.world, self.kept.next_mission)?;
         self.kept.next_mission += 1;
+        if index == 0 && self.settings.share_rb > 0.0 {
+            let scenario = ScenarioKind::ReturnBase.scenario();
+            mission.realization = Realization::draw(self.world.city(), &scenario, mission.seed)?;
+            mission.preference = Preference::ENERGY;
+        }
         let flight = Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)?;
         Ok((flight, self.planner.study(&mission.realization)))
     }
@@ -183,7 +201,7 @@ impl Distillation {
             }
             self.kept.next_lesson = (self.kept.next_lesson + 1) % self.settings.replay;
             if flight.is_over() {
-                self.flights[index] = self.next_flight()?;
+                self.flights[index] = self.next_flight(index)?;
             }
         }
         Ok(())
@@ -234,7 +252,7 @@ impl Distillation {
         let score = tables.score();
         if best.as_ref().is_none_or(|best| score > best.score) {
             *best = Some(Learned {
-                method: "distil".into(),
+                method: self.method.clone(),
                 settings: self.settings.clone(),
                 actor: self.kept.averaged.clone(),
                 update: self.kept.update,

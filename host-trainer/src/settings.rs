@@ -139,6 +139,28 @@ impl Settings {
         }
     }
 
+    /// The command that learns the same again: every setting that is not at its default.
+    #[must_use]
+    pub fn command_line(&self, method: &str, out: &str) -> String {
+        use clap::Args as _;
+        let mut command = format!("gleaner-train {method} --out {out}");
+        let all = serde_json::to_value(self).unwrap_or_default();
+        let described = Settings::augment_args(clap::Command::new("settings"));
+        for argument in described.get_arguments() {
+            let (Some(flag), Some(value)) = (argument.get_long(), all.get(argument.get_id().as_str())) else {
+                continue;
+            };
+            // Settings are f32 and f64: the shortest text that reads back the same is what was typed.
+            let value =
+                value.as_f64().map_or_else(|| value.to_string(), |number| format!("{}", number as f32));
+            let default = argument.get_default_values().first().and_then(|value| value.to_str());
+            if default.unwrap_or("").parse::<f32>().ok() != value.parse::<f32>().ok() {
+                command += &format!(" --{flag} {value}");
+            }
+        }
+        command
+    }
+
     /// How far along the annealing is, 0 to 1.
     #[must_use]
     pub fn annealed(&self, update: u64) -> f32 {

@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         name: arguments.name.clone(),
         version: env!("CARGO_PKG_VERSION").into(),
         commit,
-        command: command(&learned),
+        command: learned.settings.command_line(&learned.method, "RUN"),
         seed: learned.settings.seed,
         steps: learned.steps,
         scenario: scenario_name(&learned.settings),
@@ -181,27 +181,6 @@ fn scenario_name(settings: &Settings) -> String {
         100.0 * (1.0 - settings.share_rd - settings.share_rb),
         100.0 * settings.share_varied
     )
-}
-
-/// The command that trains it again: every setting that is not at its default.
-fn command(learned: &Learned) -> String {
-    use clap::Args as _;
-    let settings = &learned.settings;
-    let mut command = format!("gleaner-train {} --out RUN", learned.method);
-    let all = serde_json::to_value(settings).unwrap_or_default();
-    let described = Settings::augment_args(clap::Command::new("train"));
-    for argument in described.get_arguments() {
-        let (Some(flag), Some(value)) = (argument.get_long(), all.get(argument.get_id().as_str())) else {
-            continue;
-        };
-        // Settings are f32 and f64: the shortest text that reads back the same is what was typed.
-        let value = value.as_f64().map_or_else(|| value.to_string(), |number| format!("{}", number as f32));
-        let default = argument.get_default_values().first().and_then(|value| value.to_str()).unwrap_or("");
-        if default.parse::<f32>().ok() != value.parse::<f32>().ok() {
-            let _ = write!(command, " --{flag} {value}");
-        }
-    }
-    command
 }
 
 fn head_commit() -> Result<String> {

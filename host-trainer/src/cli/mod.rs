@@ -21,7 +21,7 @@ enum Command {
     Train(train::Arguments),
     /// Teach a policy what a planner with full knowledge does; resumes like train. Of the settings it uses the
     /// missions, the batch (batch x preferences lessons), the replay size and the learning rates.
-    Distil(train::Arguments),
+    Distil(train::DistilArguments),
     /// Print the paper's metrics of a model, a checkpoint and GREEDY.
     Evaluate(evaluate::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.

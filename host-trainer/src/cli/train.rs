@@ -1,5 +1,6 @@
 //! `gleaner-train train` and `gleaner-train distil`.
 
+use super::evaluate::learned;
 use anyhow::{Context, Result};
 use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::settings::Settings;
@@ -22,6 +23,16 @@ pub struct Arguments {
     validate_every: u64,
     #[command(flatten)]
     settings: Settings,
+}
+
+/// What only the distillation takes.
+#[derive(Debug, clap::Args)]
+pub struct DistilArguments {
+    /// Begin with what the run in this folder has learned.
+    #[arg(long)]
+    from: Option<PathBuf>,
+    #[command(flatten)]
+    usual: Arguments,
 }
 
 /// Learns by trial: MOSAC.
@@ -49,9 +60,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Learns from the planner: distillation.
-pub fn distil(arguments: &Arguments) -> Result<()> {
+pub fn distil(arguments: &DistilArguments) -> Result<()> {
+    let from = arguments.from.as_deref().map(learned).transpose()?;
+    let arguments = &arguments.usual;
     let mut desk = Desk::open(arguments)?;
-    let mut run = Distillation::open(arguments.settings.clone(), &arguments.out)?;
+    let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref())?;
     desk.begin(run.update());
     while !run.is_done() {
         let cross_entropy = run.advance()?;
