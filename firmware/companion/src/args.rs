@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn a_wrong_endpoint_is_one_line_that_shows_a_right_one() {
-        let Err(error) = CommandLine::try_parse_from(["gleaner", "run", "--autopilot", "tcp:1.2.3.4:5"]) else {
+        let Err(error) = CommandLine::try_parse_from(["gleaner", "run", "--autopilot", "tcp:1.2.3.4:5"])
+        else {
             panic!("accepted");
         };
         let line = one_line(&error.to_string());

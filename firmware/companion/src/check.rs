@@ -33,7 +33,10 @@ pub fn check(setup: &Setup, wait_s: u64) -> Result<ExitCode, StartError> {
     let model = findings.of("model", load::model(&config.model), |model| {
         let info = model.info();
         let identity: String = info.sha256.chars().take(12).collect();
-        format!("{} {}, {} steps in {}, sha256 {identity}", info.card.name, info.card.version, info.card.steps, info.card.scenario)
+        format!(
+            "{} {}, {} steps in {}, sha256 {identity}",
+            info.card.name, info.card.version, info.card.steps, info.card.scenario
+        )
     });
     if let Some(model) = model {
         check_engine(&mut findings, model);
@@ -117,17 +120,30 @@ fn check_mission(findings: &mut Findings, mission: &Mission, config: &Config) {
         findings.bad("way home", format!("{budget} battery units do not cover the shortest way home and {reserve} in reserve: raise battery_units or lower GLN_RESERVE"));
     } else {
         let of = mission.fence.len();
-        findings.good("way home", format!("{budget} battery units, {reserve} in reserve: may engage over {covered} of {of} cells"));
+        findings.good(
+            "way home",
+            format!("{budget} battery units, {reserve} in reserve: may engage over {covered} of {of} cells"),
+        );
     }
     let full = parameters.full_battery();
     if full.0 < budget {
         findings.bad("battery", format!("the mission wants {budget} units, a full battery is {}: lower battery_units or correct GLN_BAT_UNITS", full.0));
     } else {
-        findings.good("battery", format!("the mission takes {:.0} % of a full battery of {} units", percent(mission.budget, full), full.0));
+        findings.good(
+            "battery",
+            format!(
+                "the mission takes {:.0} % of a full battery of {} units",
+                percent(mission.budget, full),
+                full.0
+            ),
+        );
     }
     let (altitude, tallest) = (parameters.altitude().0, mission.heights.tallest().0);
     if altitude <= tallest {
-        findings.bad("altitude", format!("{altitude} m is not above the tallest building of {tallest} m: raise GLN_ALT"));
+        findings.bad(
+            "altitude",
+            format!("{altitude} m is not above the tallest building of {tallest} m: raise GLN_ALT"),
+        );
     } else {
         findings.good("altitude", format!("{altitude} m, tallest building {tallest} m"));
     }
@@ -159,7 +175,8 @@ fn check_ports(findings: &mut Findings, config: &Config, wait_s: u64) {
     if let Some(endpoint) = &config.radio {
         findings.of("radio", open("radio", endpoint), |port| port.endpoint().to_string());
     }
-    let link = findings.of("autopilot", open("autopilot", &config.autopilot), |port| port.endpoint().to_string());
+    let link =
+        findings.of("autopilot", open("autopilot", &config.autopilot), |port| port.endpoint().to_string());
     if let Some(mut link) = link
         && wait_s > 0
     {

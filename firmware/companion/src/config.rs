@@ -63,7 +63,9 @@ pub enum ConfigError {
         what: String,
     },
     /// Neither file nor flag says this.
-    #[error("no {key} is set: give --{key}, or write `{key} = \"{example}\"` into the file given with --config")]
+    #[error(
+        "no {key} is set: give --{key}, or write `{key} = \"{example}\"` into the file given with --config"
+    )]
     Missing {
         /// The key, which is also the flag.
         key: &'static str,
@@ -240,10 +242,26 @@ GLN_ALT = 75.5
     fn faults_name_file_line_and_key_and_say_what_to_do() {
         let file = "config /etc/gleaner/gleaner.toml: ";
         let cases = [
-            ("component_id = 192", "component_id = 1", "line 6: component_id = 1: it must be a number from 2 to 254, 191 to 194 are usual"),
-            ("system_id = 7", "system_id = 256", "line 7: system_id = 256: it must be a number from 1 to 254, or leave it out to adopt the autopilot's"),
-            ("GLN_W_DATA = 1", "GLN_ENABLE = 1", "line 10: GLN_ENABLE = 1: only a request in flight may engage: remove this line"),
-            ("GLN_W_DATA = 1", "GLN_DATA = 1", "line 10: GLN_DATA = 1: no such parameter: correct or remove this line"),
+            (
+                "component_id = 192",
+                "component_id = 1",
+                "line 6: component_id = 1: it must be a number from 2 to 254, 191 to 194 are usual",
+            ),
+            (
+                "system_id = 7",
+                "system_id = 256",
+                "line 7: system_id = 256: it must be a number from 1 to 254, or leave it out to adopt the autopilot's",
+            ),
+            (
+                "GLN_W_DATA = 1",
+                "GLN_ENABLE = 1",
+                "line 10: GLN_ENABLE = 1: only a request in flight may engage: remove this line",
+            ),
+            (
+                "GLN_W_DATA = 1",
+                "GLN_DATA = 1",
+                "line 10: GLN_DATA = 1: no such parameter: correct or remove this line",
+            ),
         ];
         for (from, to, expected) in cases {
             assert_eq!(fault(&TEXT.replace(from, to)), format!("{file}{expected}"));

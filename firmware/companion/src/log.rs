@@ -137,7 +137,9 @@ impl<W: Write> Journal<W> {
             Ok(()) => {}
             Err(error) => {
                 if self.lost == 0 {
-                    tracing::error!("decision log: {error}: make room on the disk; flying on without the log");
+                    tracing::error!(
+                        "decision log: {error}: make room on the disk; flying on without the log"
+                    );
                 }
                 self.lost += 1;
             }

@@ -24,6 +24,8 @@ use std::time::{Duration, Instant};
 const TICK: Duration = Duration::from_millis(20);
 /// Reads per port and wake-up: a flood on one port must not starve the poll.
 const READS_PER_WAKE: usize = 32;
+/// How long the last words may take: status texts leave at ten a second.
+const GOODBYE: Duration = Duration::from_millis(300);
 /// Longest MAVLink 2 frame: header 10, payload 255, checksum 2, signature 13.
 const FRAME_BYTES: usize = 280;
 
@@ -37,8 +39,9 @@ pub fn run(setup: &Setup) -> Result<ExitCode, StartError> {
     let engine = load::model(&config.model)?;
     let model = engine.info().card.name.clone();
     // The engine reproduced its golden pairs, or it would not have been loaded.
-    let onboard = Onboard::new(mission, config.parameters.clone(), config.settings, Timed::new(engine), Ok(()))
-        .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
+    let onboard =
+        Onboard::new(mission, config.parameters.clone(), config.settings, Timed::new(engine), Ok(()))
+            .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
     let log = config.log_dir.as_deref().map(DecisionLog::open).transpose()?;
     let link = open("autopilot", &config.autopilot)?;
     let radio = config.radio.as_ref().map(|endpoint| open("radio", endpoint)).transpose()?;
@@ -46,7 +49,7 @@ pub fn run(setup: &Setup) -> Result<ExitCode, StartError> {
     start_messages();
     introduce(&config, &model, &link, radio.as_ref());
     let mut flight = Flight { onboard, link, radio, log, clock: Clock::start(), said: State::Boot };
-    flight.fly(&stop);
+    flight.fly(|| stop.load(Ordering::Relaxed));
     flight.end();
     Ok(ExitCode::SUCCESS)
 }
@@ -74,7 +77,8 @@ fn introduce(config: &Config, model: &str, link: &Port, radio: Option<&Port>) {
     tracing::info!("gleaner {} with model {model} ({})", env!("CARGO_PKG_VERSION"), config.model.display());
     for (role, port) in [("autopilot", Some(link)), ("radio", radio)] {
         if let Some(port) = port {
-            let at = port.local_address().map_or_else(String::new, |address| format!(", local address {address}"));
+            let at =
+                port.local_address().map_or_else(String::new, |address| format!(", local address {address}"));
             tracing::info!("{role} port {} is open{at}", port.endpoint());
         }
     }
@@ -90,9 +94,9 @@ struct Flight {
 }
 
 impl Flight {
-    fn fly(&mut self, stop: &AtomicBool) {
+    fn fly(&mut self, is_over: impl Fn() -> bool) {
         let mut next_tick = Instant::now();
-        while !stop.load(Ordering::Relaxed) {
+        while !is_over() {
             self.hear();
             let now = Instant::now();
             if now >= next_tick {
@@ -157,7 +161,10 @@ impl Flight {
                     self.onboard.say(Severity::Notice, format_args!("gleaner: {role} port is back"));
                 }
                 PortState::Down(reason) => {
-                    tracing::warn!("{role} port {} is down: {reason}: trying to open it again", port.endpoint());
+                    tracing::warn!(
+                        "{role} port {} is down: {reason}: trying to open it again",
+                        port.endpoint()
+                    );
                     self.onboard.say(Severity::Warning, format_args!("gleaner: {role} port down, retrying"));
                 }
             }
@@ -186,7 +193,6 @@ impl Flight {
 
     /// Says goodbye. Nothing is sent after that: to the autopilot, the silence is the message.
     fn end(mut self) {
-        let decisions = self.onboard.stats().decisions;
         let flying = matches!(self.onboard.state(), State::Engaged | State::Homing);
         if flying {
             self.onboard.say(Severity::Critical, format_args!("gleaner: stopped in flight, take over now"));
@@ -196,8 +202,9 @@ impl Flight {
         } else {
             self.onboard.say(Severity::Warning, format_args!("gleaner: stopped"));
         }
-        self.tick(Instant::now());
-        self.speak();
+        let end = Instant::now() + GOODBYE;
+        self.fly(|| Instant::now() >= end);
+        let decisions = self.onboard.stats().decisions;
         tracing::info!("stopped after {decisions} decisions: setpoints and heartbeat have ended");
         if let Some(log) = self.log {
             log.close();

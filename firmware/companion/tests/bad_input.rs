@@ -59,8 +59,16 @@ fn models() {
         ("truncated", half, &["copy the file again"]),
         ("garbage", &random, &["not an ONNX model", "copy the file again"]),
         ("altered", &altered, &["copy the file again"]),
-        ("golden mismatch", &wrong_golden, &["self-test failed: golden pair 0 differs by 5e-1", "do not fly"]),
-        ("schema mismatch", &with_entry("schema_hash", "0x0000000000000001"), &["schema 0x0000000000000001", "retrain"]),
+        (
+            "golden mismatch",
+            &wrong_golden,
+            &["self-test failed: golden pair 0 differs by 5e-1", "do not fly"],
+        ),
+        (
+            "schema mismatch",
+            &with_entry("schema_hash", "0x0000000000000001"),
+            &["schema 0x0000000000000001", "retrain"],
+        ),
     ];
     for (name, bytes, parts) in cases {
         fixture.write("policy.onnx", bytes);
@@ -78,13 +86,33 @@ fn models() {
 #[test]
 fn missions() {
     let cases: [(&str, &str, &str, &[&str]); 7] = [
-        ("mission.toml", "terminal = [3, 2]", "terminal = [9, 2]", &["mission.toml: line 1: ", "move the terminal"]),
+        (
+            "mission.toml",
+            "terminal = [3, 2]",
+            "terminal = [9, 2]",
+            &["mission.toml: line 1: ", "move the terminal"],
+        ),
         ("mission.toml", "[2, 1]", "[2, 9]", &["mission.toml: line 10: device 1 stands outside the city"]),
-        ("mission.toml", "battery_units = 20.0", "battery_units = nan", &["mission.toml: line 2: ", "give one"]),
+        (
+            "mission.toml",
+            "battery_units = 20.0",
+            "battery_units = nan",
+            &["mission.toml: line 2: ", "give one"],
+        ),
         ("mission.toml", "cell_m", "cell_metres", &["mission.toml: line 7: unknown field `cell_metres`"]),
         ("mission.toml", "[grid]", "[grid", &["mission.toml: line 4: "]),
-        ("mission.toml", "city.csv", "town.csv", &["line 8: heights \"town.csv\": cannot be read", "put the city beside"]),
-        ("city.csv", "33", "cheese", &["mission.toml: heights \"city.csv\", line 2, value 2: not a whole number"]),
+        (
+            "mission.toml",
+            "city.csv",
+            "town.csv",
+            &["line 8: heights \"town.csv\": cannot be read", "put the city beside"],
+        ),
+        (
+            "city.csv",
+            "33",
+            "cheese",
+            &["mission.toml: heights \"city.csv\", line 2, value 2: not a whole number"],
+        ),
     ];
     for (file, from, to, parts) in cases {
         let fixture = Fixture::new();
@@ -102,11 +130,27 @@ fn configurations() {
     let cases: [(&str, &str, &[&str]); 7] = [
         ("model =", "modle =", &["gleaner.toml: line 1: unknown field `modle`, expected one of `model`"]),
         ("\"policy.onnx\"", "\"policy.onnx", &["gleaner.toml: line 1: "]),
-        ("udpin:127.0.0.1:0", "udpin:0", &["line 3: autopilot: 'udpin:0' is not an endpoint: ", "write HOST:PORT as in"]),
-        ("GLN_W_DATA = 0.25", "GLN_W_DATA = 2", &["line 7: GLN_W_DATA = 2: ", "0..1", "correct or remove this line"]),
-        ("GLN_W_DATA = 0.25", "GLN_W_DATA = nan", &["line 7: GLN_W_DATA = NaN: ", "correct or remove this line"]),
+        (
+            "udpin:127.0.0.1:0",
+            "udpin:0",
+            &["line 3: autopilot: 'udpin:0' is not an endpoint: ", "write HOST:PORT as in"],
+        ),
+        (
+            "GLN_W_DATA = 0.25",
+            "GLN_W_DATA = 2",
+            &["line 7: GLN_W_DATA = 2: ", "0..1", "correct or remove this line"],
+        ),
+        (
+            "GLN_W_DATA = 0.25",
+            "GLN_W_DATA = nan",
+            &["line 7: GLN_W_DATA = NaN: ", "correct or remove this line"],
+        ),
         ("GLN_W_DATA = 0.25", "GLN_FOO = 1", &["line 7: GLN_FOO = 1: no such parameter: "]),
-        ("log_dir = \"log\"", "component_id = 300", &["line 4: component_id = 300: it must be a number from 2 to 254"]),
+        (
+            "log_dir = \"log\"",
+            "component_id = 300",
+            &["line 4: component_id = 300: it must be a number from 2 to 254"],
+        ),
     ];
     for (from, to, parts) in cases {
         let fixture = Fixture::new();
@@ -117,9 +161,15 @@ fn configurations() {
     }
     let fixture = Fixture::new();
     fixture.edit("gleaner.toml", "mission = \"mission.toml\"\n", "");
-    says(&refusal(&fixture, |_, _| {}), &["no mission is set: give --mission, or write `mission = \"mission.toml\"`"]);
+    says(
+        &refusal(&fixture, |_, _| {}),
+        &["no mission is set: give --mission, or write `mission = \"mission.toml\"`"],
+    );
     std::fs::remove_file(fixture.path("gleaner.toml")).unwrap();
-    says(&refusal(&fixture, |_, _| {}), &["gleaner.toml: cannot be read: ", "correct the path after --config"]);
+    says(
+        &refusal(&fixture, |_, _| {}),
+        &["gleaner.toml: cannot be read: ", "correct the path after --config"],
+    );
 }
 
 #[test]
@@ -129,10 +179,18 @@ fn ports() {
     let closed = format!("tcpout:{}", TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap());
     let fixture = Fixture::new();
     for (flag, endpoint, parts) in [
-        ("--autopilot", "serial:/dev/ttyNOSUCH:57600", ["autopilot port serial:/dev/ttyNOSUCH:57600: ", "plug the device in"]),
+        (
+            "--autopilot",
+            "serial:/dev/ttyNOSUCH:57600",
+            ["autopilot port serial:/dev/ttyNOSUCH:57600: ", "plug the device in"],
+        ),
         ("--autopilot", taken.as_str(), ["autopilot port udpin:127.0.0.1:", "stop the other program"]),
         ("--autopilot", closed.as_str(), ["autopilot port tcpout:127.0.0.1:", "start the other side first"]),
-        ("--radio", "serial:/dev/null", ["radio port serial:/dev/null:57600: ", "check that this is a serial device"]),
+        (
+            "--radio",
+            "serial:/dev/null",
+            ["radio port serial:/dev/null:57600: ", "check that this is a serial device"],
+        ),
         ("--radio", "serial:/dev/ttyS0:fast", ["--radio", "the baud rate must be a whole number above 0"]),
     ] {
         let line = refusal(&fixture, |_, gleaner| {
@@ -163,7 +221,7 @@ fn command_lines() {
     says(&refused(&mut gleaner(&["fly"])), &["unrecognized subcommand 'fly'", "see `gleaner --help`"]);
     says(&refused(&mut gleaner(&["run", "--modle", "x"])), &["unexpected argument '--modle'"]);
     says(&refused(&mut gleaner(&["run"])), &["no model is set: give --model"]);
-    says(&refused(&mut gleaner(&["check", "--wait", "-1"])), &["--wait"]);
+    says(&refused(&mut gleaner(&["check", "--wait", "soon"])), &["--wait"]);
     let (code, stdout, stderr) = outcome(&gleaner(&["--help"]).output().unwrap());
     assert_eq!((code, stderr.as_str()), (Some(0), ""));
     says(&stdout, &["run", "check"]);

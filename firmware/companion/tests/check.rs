@@ -10,9 +10,19 @@ fn a_good_set_up_is_ready() {
     let fixture = Fixture::new();
     let (code, stdout, stderr) = outcome(&fixture.gleaner("check").output().unwrap());
     assert_eq!((code, stderr.as_str()), (Some(0), ""), "{stdout}");
-    let whats: Vec<&str> = stdout.lines().map(|line| line.split_whitespace().take(2).last().unwrap()).collect();
+    let whats: Vec<&str> =
+        stdout.lines().map(|line| line.split_whitespace().take(2).last().unwrap()).collect();
     let expected = [
-        "config", "mission", "way", "battery", "altitude", "model", "self-test", "inference", "autopilot", "log",
+        "config",
+        "mission",
+        "way",
+        "battery",
+        "altitude",
+        "model",
+        "self-test",
+        "inference",
+        "autopilot",
+        "log",
         "ready",
     ];
     assert_eq!(whats, expected, "{stdout}");
@@ -69,7 +79,15 @@ fn the_example_files_are_consistent() {
     let dist = concat!(env!("CARGO_MANIFEST_DIR"), "/dist/gleaner.toml");
     let fixture = Fixture::new();
     let mut gleaner = std::process::Command::new(env!("CARGO_BIN_EXE_gleaner"));
-    gleaner.args(["check", "--config", dist, "--autopilot", "udpin:127.0.0.1:0", "--radio", "udp:127.0.0.1:0"]);
+    gleaner.args([
+        "check",
+        "--config",
+        dist,
+        "--autopilot",
+        "udpin:127.0.0.1:0",
+        "--radio",
+        "udp:127.0.0.1:0",
+    ]);
     gleaner.arg("--model").arg(fixture.path("policy.onnx")).arg("--log").arg(fixture.path("log"));
     let (code, stdout, stderr) = outcome(&gleaner.output().unwrap());
     assert_eq!((code, stderr.as_str()), (Some(0), ""), "{stdout}");

@@ -107,7 +107,12 @@ impl FakeAutopilot {
             flags: EkfStatusFlags::from_bits_truncate(0x33F),
             ..EKF_STATUS_REPORT_DATA::DEFAULT
         });
-        self.send(&LOCAL_POSITION_NED_DATA { x: 10.0, y: 30.0, z: -60.0, ..LOCAL_POSITION_NED_DATA::DEFAULT });
+        self.send(&LOCAL_POSITION_NED_DATA {
+            x: 10.0,
+            y: 30.0,
+            z: -60.0,
+            ..LOCAL_POSITION_NED_DATA::DEFAULT
+        });
         self.send(&BATTERY_STATUS_DATA { battery_remaining: 50, ..BATTERY_STATUS_DATA::DEFAULT });
     }
 
