@@ -86,7 +86,9 @@ impl Distillation {
         let path = folder.join(CHECKPOINT);
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let kept = if path.exists() {
-            let kept: Kept = checkpoint::load(&path)?;
+            let mut kept: Kept = checkpoint::load(&path)?;
+            // A finished run may be prolonged.
+            kept.settings.updates = settings.updates;
             if kept.settings != settings {
                 return Err(TrainError::OtherSettings { path });
             }
