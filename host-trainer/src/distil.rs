@@ -19,6 +19,7 @@ use gleaner_world::{Realization, ScenarioKind, World};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -30,6 +31,9 @@ const FLIGHTS: usize = 16;
 const WARM_UP: usize = 2_000;
 /// Updates over which the planner hands the controls to the learner.
 const HAND_OVER: u64 = 2_000;
+/// Lessons of the shortest mission that are kept, and how often one of them is in a batch.
+const SHORTEST_KEPT: usize = 4_000;
+const SHORTEST_EVERY: usize = 4;
 /// Share of the actor that its running average takes over per update.
 const AVERAGING: f32 = 0.001;
 
@@ -50,6 +54,7 @@ pub struct Distillation {
     world: Arc<World>,
     planner: Planner,
     flights: Vec<(Flight, KnownMission)>,
+    shortest: VecDeque<Lesson>,
     kept: Kept,
     gradients: Vec<f32>,
     batch: Batch,
@@ -58,7 +63,7 @@ pub struct Distillation {
     validation: Validation,
 }
 
-/// What the checkpoint keeps. Flights in the air begin anew after a kill.
+/// What the checkpoint keeps. Flights in the air, and the lessons of the shortest mission, begin anew after a kill.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     settings: Settings,
@@ -122,6 +127,7 @@ impl Distillation {
             settings,
             world,
             flights: Vec::new(),
+            shortest: VecDeque::new(),
             kept,
             gradients: Vec::new(),
             batch: Batch::new(),
@@ -136,7 +142,7 @@ impl Distillation {
     }
 
     /// The first of the flights is always out and back for energy alone. It lasts two slots, so among the lessons of
-    /// drawn missions it would hardly be seen, and it must be flown exactly.
+    /// drawn missions it would hardly be seen, and it must be flown exactly: its lessons are kept apart.
     fn next_flight(&mut self, index: usize) -> Result<(Flight, KnownMission), TrainError> {
         let mut mission = self.settings.mission(&self.world, self.kept.next_mission)?;
         self.kept.next_mission += 1;
@@ -166,7 +172,7 @@ impl Distillation {
     /// # Errors
     /// No mission could be drawn.
     pub fn advance(&mut self) -> Result<f32, TrainError> {
-        while self.kept.lessons.len() < WARM_UP {
+        while self.kept.lessons.len() < WARM_UP || self.shortest.is_empty() {
             self.fly()?;
         }
         // As many slots per update as the settings say, in rounds of all flights.
@@ -196,6 +202,10 @@ impl Distillation {
             flight.step(action);
             self.kept.steps += 1;
             let lesson = Lesson { seen, preference, mask, taught };
+            if index == 0 {
+                self.shortest.truncate(SHORTEST_KEPT - 1);
+                self.shortest.push_front(lesson.clone());
+            }
             if self.kept.lessons.len() < self.settings.replay {
                 self.kept.lessons.push(lesson);
             } else {
@@ -212,7 +222,13 @@ impl Distillation {
     fn learn(&mut self) -> f32 {
         let count = self.settings.batch * self.settings.preferences;
         let lessons: Vec<&Lesson> = (0..count)
-            .map(|_| &self.kept.lessons[self.rng.random_range(0..self.kept.lessons.len())])
+            .map(|index| {
+                if index % SHORTEST_EVERY == 0 {
+                    &self.shortest[self.rng.random_range(0..self.shortest.len())]
+                } else {
+                    &self.kept.lessons[self.rng.random_range(0..self.kept.lessons.len())]
+                }
+            })
             .collect();
         self.batch.clear();
         for lesson in &lessons {

@@ -74,6 +74,7 @@ struct MeanFlight {
     remaining: Vec<f32>,
     collected: f32,
     energy: f32,
+    moved: bool,
     first: Option<Action>,
 }
 
@@ -85,6 +86,7 @@ impl MeanFlight {
             remaining: start.remaining.clone(),
             collected: 0.0,
             energy: 0.0,
+            moved: false,
             first: None,
         }
     }
@@ -268,8 +270,8 @@ impl KnownMission {
                 }
             }
         }
-        if flight.cell == guard.terminal() && flight.energy == 0.0 {
-            // Nothing to visit from a start on the terminal: out and back.
+        if flight.cell == guard.terminal() && !flight.moved {
+            // Hovering on a terminal that it started from ends nothing: out and back.
             let out = Action::MOVES.into_iter().find(|&out| distance(flight.cell.after(out)) == 1.0);
             if let Some(out) = out {
                 self.slot(flight, out);
@@ -292,6 +294,7 @@ impl KnownMission {
         flight.cell = flight.cell.after(action);
         flight.battery -= action.cost().0;
         flight.energy += action.cost().0;
+        flight.moved |= action != Action::Hover;
         flight.first = flight.first.or(Some(action));
     }
 
