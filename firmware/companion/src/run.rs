@@ -15,6 +15,7 @@ use gleaner_pilot::{Onboard, State};
 use gleaner_policy::onnx::TractPolicy;
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use gleaner_units::Duration as PilotDuration;
+use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,7 +71,12 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>, StartError> {
 fn start_messages() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).init();
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .init();
 }
 
 fn introduce(config: &Config, model: &str, link: &Port, radio: Option<&Port>) {

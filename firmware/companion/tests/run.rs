@@ -175,7 +175,7 @@ fn it_speaks_as_a_component_of_the_vehicle_and_ends_on_an_interrupt() {
     let mut running = Running::start(&mut fixture.gleaner("run"));
     let mut autopilot = FakeAutopilot::find(&mut running);
     let (sender, heartbeat) = autopilot.until(|sender, message| match message {
-        Message::Heartbeat(heartbeat) => Some((sender, heartbeat.clone())),
+        Message::Heartbeat(heartbeat) => Some((sender, *heartbeat)),
         _ => None,
     });
     assert_eq!(sender, GLEANER, "the autopilot's system id is adopted");
