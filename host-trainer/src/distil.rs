@@ -1,8 +1,8 @@
-//! Distillation: the actor learns to do what a planner that knows everything would do, from what it can see.
+//! Distillation: the actor learns to do what a teacher that knows everything would do, from what it can see.
 //!
-//! The learner flies and the planner says at every slot what it would have done (DAgger: Ross, Gordon and Bagnell
+//! The learner flies and the teacher says at every slot what it would have done (DAgger: Ross, Gordon and Bagnell
 //! 2011), so the learner is taught in the states that it gets itself into. The loss is the cross entropy of the
-//! planner's distribution under the masked policy.
+//! teacher's distribution under the masked policy.
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::Network;
@@ -10,8 +10,8 @@ use crate::flight::Flight;
 use crate::mosac::Distribution;
 use crate::net::{self, Adam, Batch, Shape, Workspace};
 use crate::observation::Observation;
-use crate::planner::{KnownMission, Planner};
 use crate::settings::Settings;
+use crate::teacher::{Course, Teacher};
 use crate::train::{Learned, TrainError, Validation};
 use gleaner_policy::Preference;
 use gleaner_units::{Action, ActionMask};
@@ -29,7 +29,7 @@ pub const CHECKPOINT: &str = "distil.checkpoint";
 const FLIGHTS: usize = 16;
 /// Lessons before the first update.
 const WARM_UP: usize = 2_000;
-/// Updates over which the planner hands the controls to the learner.
+/// Updates over which the teacher hands the controls to the learner.
 const HAND_OVER: u64 = 2_000;
 /// Lessons of the shortest mission that are kept, and how often one of them is in a batch.
 const SHORTEST_KEPT: usize = 4_000;
@@ -37,7 +37,7 @@ const SHORTEST_EVERY: usize = 4;
 /// Share of the actor that its running average takes over per update.
 const AVERAGING: f32 = 0.001;
 
-/// A state and what the planner would do in it.
+/// A state and what the teacher would do in it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Lesson {
     seen: Observation,
@@ -52,8 +52,8 @@ pub struct Distillation {
     method: String,
     settings: Settings,
     world: Arc<World>,
-    planner: Planner,
-    flights: Vec<(Flight, KnownMission)>,
+    teacher: Teacher,
+    flights: Vec<(Flight, Course)>,
     shortest: VecDeque<Lesson>,
     kept: Kept,
     gradients: Vec<f32>,
@@ -117,7 +117,7 @@ impl Distillation {
         };
         let world = Arc::new(World::default_world());
         let mut run = Distillation {
-            planner: Planner::new(Arc::clone(&world)),
+            teacher: Teacher::new(Arc::clone(&world)),
             validation: Validation::draw(&world, &settings)?,
             method: from.map_or("distil".into(), |learned| {
                 let before = learned.settings.command_line(&learned.method, "FIRST");
@@ -143,7 +143,7 @@ impl Distillation {
 
     /// The first of the flights is always out and back for energy alone. It lasts two slots, so among the lessons of
     /// drawn missions it would hardly be seen, and it must be flown exactly: its lessons are kept apart.
-    fn next_flight(&mut self, index: usize) -> Result<(Flight, KnownMission), TrainError> {
+    fn next_flight(&mut self, index: usize) -> Result<(Flight, Course), TrainError> {
         let mut mission = self.settings.mission(&self.world, self.kept.next_mission)?;
         self.kept.next_mission += 1;
         if index == 0 && self.settings.share_rb > 0.0 {
@@ -152,7 +152,7 @@ impl Distillation {
             mission.preference = Preference::ENERGY;
         }
         let flight = Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)?;
-        Ok((flight, self.planner.study(&mission.realization)))
+        Ok((flight, self.teacher.study(&mission.realization)))
     }
 
     /// Updates done.
@@ -186,7 +186,7 @@ impl Distillation {
         Ok(loss)
     }
 
-    /// Every flight is shown to the planner; the learner, or at first the planner, decides.
+    /// Every flight is shown to the teacher; the learner, or at first the teacher, decides.
     fn fly(&mut self) -> Result<(), TrainError> {
         let seen: Vec<Observation> = self.flights.iter().map(|(flight, _)| flight.observe()).collect();
         let inputs = self.flights.iter().zip(&seen).map(|((flight, _), seen)| seen.with(flight.preference()));

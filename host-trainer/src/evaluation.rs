@@ -5,7 +5,6 @@ use crate::greedy::Greedy;
 use crate::net::{self, Batch, Sample, Shape, Workspace};
 use crate::observation::normalise;
 use crate::pareto::{REFERENCE, hypervolume};
-use crate::planner::Planner;
 use gleaner_policy::{Policy, Preference};
 use gleaner_units::Action;
 use gleaner_world::{Realization, Scenario, ScenarioError, Seed, World};
@@ -173,35 +172,6 @@ pub fn realizations(
             Realization::draw(world.city(), scenario, seed).map(|realization| (seed, realization))
         })
         .collect()
-}
-
-/// The planner with full knowledge on the same realizations, replanning at every slot: what the policies are measured
-/// against.
-///
-/// # Panics
-/// When the realizations belong to another world.
-#[must_use]
-pub fn evaluate_planner(world: &Arc<World>, realizations: &[(Seed, Realization)]) -> Table {
-    let planner = Planner::new(Arc::clone(world));
-    let rows = test_preferences()
-        .iter()
-        .map(|&preference| {
-            let totals: Vec<Reward> = realizations
-                .iter()
-                .map(|(seed, realization)| {
-                    let mut known = planner.study(realization);
-                    let mut flight =
-                        Flight::new(world, realization, *seed, preference).expect("drawn for this world");
-                    while !flight.is_over() {
-                        flight.step(known.advise(&flight));
-                    }
-                    flight.total()
-                })
-                .collect();
-            Row::new(preference.w_data(), &totals)
-        })
-        .collect();
-    Table::new(rows)
 }
 
 /// Flies every realization under every test preference.

@@ -4,7 +4,9 @@ use crate::observation::Observation;
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, CellSet};
-use gleaner_world::{Episode, Realization, ScenarioError, Seed, World};
+use gleaner_world::{Episode, Realization, ScenarioError, Seed, Stream, World};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// The data that one slot brings, in percent of all there was, and minus its energy in battery units: the
@@ -18,6 +20,28 @@ pub struct Flight {
     guard: Guard,
     preference: Preference,
     total: Reward,
+    reports: Option<Reports>,
+}
+
+/// What has arrived of the devices' reports, where not all do.
+#[derive(Clone, Debug)]
+struct Reports {
+    missing: f64,
+    rng: ChaCha8Rng,
+    /// By device: whether this slot's report arrived, and the data that was reported last.
+    last: Vec<(bool, f32)>,
+}
+
+impl Reports {
+    fn listen(&mut self, episode: &Episode) {
+        for (last, device) in self.last.iter_mut().zip(episode.devices()) {
+            *last = if self.rng.random_bool(self.missing) {
+                (false, last.1)
+            } else {
+                (true, device.remaining_units)
+            };
+        }
+    }
 }
 
 impl Flight {
@@ -38,7 +62,21 @@ impl Flight {
         let map = CellSet::full(world.city().grid());
         let guard = Guard::new(&map, realization.terminal(), BatteryUnits(0.0))
             .expect("the terminal of a scenario lies inside a map of more than one cell");
-        Ok(Flight { episode, guard, preference, total: [0.0; 2] })
+        Ok(Flight { episode, guard, preference, total: [0.0; 2], reports: None })
+    }
+
+    /// Loses this share of the reports, each by chance: the device is then not heard, and its data is that of the
+    /// report before.
+    #[must_use]
+    pub fn with_reports_missing(mut self, share: f64, seed: Seed) -> Flight {
+        if share > 0.0 {
+            let last = self.episode.devices().iter().map(|device| (true, device.remaining_units)).collect();
+            let mut reports =
+                Reports { missing: share, rng: seed.repeat(u32::MAX).rng(Stream::Choices), last };
+            reports.listen(&self.episode);
+            self.reports = Some(reports);
+        }
+        self
     }
 
     /// What the policy sees now.
@@ -53,10 +91,12 @@ impl Flight {
             preference: self.preference,
             heights: self.episode.world().city().heights(),
         };
-        let devices = self.episode.devices().iter().map(|device| DeviceState {
-            cell: device.cell,
-            remaining: device.remaining_units,
-            snr: Some(device.snr),
+        let devices = self.episode.devices().iter().enumerate().map(|(index, device)| {
+            let (arrived, remaining) = match &self.reports {
+                Some(reports) => reports.last[index],
+                None => (true, device.remaining_units),
+            };
+            DeviceState { cell: device.cell, remaining, snr: arrived.then_some(device.snr) }
         });
         Tokens::build(&situation, devices).0
     }
@@ -81,6 +121,9 @@ impl Flight {
         assert!(self.mask().allows(action), "{action:?} is outside the envelope");
         let step = self.episode.step(action).expect("what the guard allows can be flown");
         let reward = self.episode.reward(&step);
+        if let Some(reports) = &mut self.reports {
+            reports.listen(&self.episode);
+        }
         for (total, part) in self.total.iter_mut().zip(reward) {
             *total += part;
         }

@@ -14,6 +14,7 @@
 //! [`replay`] keeps them, [`mosac`] learns from them, [`evaluation`] judges, [`checkpoint`] survives a kill,
 //! [`export`] writes the model. The network itself is [`net`].
 
+pub mod bound;
 pub mod checkpoint;
 pub mod distil;
 pub mod evaluation;
@@ -23,8 +24,12 @@ pub mod greedy;
 pub mod mosac;
 pub mod net;
 pub mod observation;
+pub mod oracle;
 pub mod pareto;
 pub mod planner;
+pub mod refine;
 pub mod replay;
 pub mod settings;
+pub mod teacher;
 pub mod train;
+pub mod variety;

@@ -87,6 +87,10 @@ pub struct Settings {
     /// B = 80. The paper trains with none.
     #[arg(long, default_value_t = 0.0)]
     pub share_varied: f64,
+    /// Refinement: share of missions over generated cities, under a channel that is a little off, with reports
+    /// missing. What the default city teaches must not be all that the policy knows.
+    #[arg(long, default_value_t = 0.0)]
+    pub share_cities: f64,
 }
 
 impl Settings {
@@ -98,7 +102,7 @@ impl Settings {
         // Runs with other seeds never share a mission in the first 2^32.
         let seed = Seed::training((self.seed << 32).wrapping_add(number));
         let mut rng = seed.rng(Stream::Choices);
-        let mut scenario = self.zones(world, &mut rng);
+        let mut scenario = self.zones(world, &mut rng).in_city(world.city());
         if rng.random_bool(self.share_varied) {
             let battery = BatteryUnits(rng.random_range(50..=120) as f32);
             scenario = scenario.with_devices(rng.random_range(1..=12)).with_battery(battery);

@@ -1,11 +1,11 @@
-//! The planner is a teacher worth having, and a pupil of it survives a kill.
+//! The teacher is a teacher worth having, and a pupil of it survives a kill.
 
 use clap::Parser;
 use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations};
 use gleaner_host_trainer::flight::Flight;
-use gleaner_host_trainer::planner::Planner;
 use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::teacher::Teacher;
 use gleaner_policy::Preference;
 use gleaner_units::Action;
 use gleaner_world::{ScenarioKind, World};
@@ -13,14 +13,14 @@ use std::sync::Arc;
 
 /// Mean percent of the data and mean energy over realizations.
 fn fly(world: &Arc<World>, kind: ScenarioKind, preference: Preference, count: u64) -> (f32, f32) {
-    let planner = Planner::new(Arc::clone(world));
+    let teacher = Teacher::new(Arc::clone(world));
     let mut sum = (0.0, 0.0);
     for (seed, realization) in realizations(world, &kind.scenario(), count).unwrap() {
-        let mut known = planner.study(&realization);
+        let mut course = teacher.study(&realization);
         let mut flight = Flight::new(world, &realization, seed, preference).unwrap();
         while !flight.is_over() {
             // Panics on an action outside the guard's mask.
-            flight.step(known.advise(&flight));
+            flight.step(course.advise(&flight));
         }
         sum = (sum.0 + flight.total()[0], sum.1 - flight.total()[1]);
     }
@@ -28,12 +28,12 @@ fn fly(world: &Arc<World>, kind: ScenarioKind, preference: Preference, count: u6
 }
 
 #[test]
-fn the_planner_collects_more_than_greedy_and_wastes_nothing_for_energy() {
+fn the_teacher_collects_more_than_greedy_and_wastes_nothing_for_energy() {
     let world = Arc::new(World::default_world());
     for (kind, least) in [(ScenarioKind::ReachDestination, 32.0), (ScenarioKind::ReturnBase, 2.0)] {
         let greedy = evaluate_greedy(&world, &realizations(&world, &kind.scenario(), 20).unwrap());
         let (percent, energy) = fly(&world, kind, Preference::DATA, 20);
-        println!("{kind}: planner {percent:.1} % for {energy:.1} units, GREEDY {:.1} %", greedy.coverage());
+        println!("{kind}: teacher {percent:.1} % for {energy:.1} units, GREEDY {:.1} %", greedy.coverage());
         assert!(percent > greedy.coverage() + 5.0, "{kind}: {percent} against {}", greedy.coverage());
         assert!(energy <= 80.0);
         assert_eq!(fly(&world, kind, Preference::ENERGY, 5).1, least, "{kind}");

@@ -1,9 +1,7 @@
 //! `gleaner-train evaluate`.
 
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{
-    Engine, Network, Table, evaluate, evaluate_greedy, evaluate_planner, realizations,
-};
+use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
@@ -31,9 +29,6 @@ pub struct Arguments {
     /// Evaluation realizations, numbers 0 to N - 1.
     #[arg(long, default_value_t = 100)]
     realizations: u64,
-    /// Fly the planner with full knowledge too; takes minutes.
-    #[arg(long)]
-    planner: bool,
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
@@ -51,9 +46,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .with_battery(BatteryUnits(f32::from(arguments.battery)));
     let drawn = realizations(&world, &scenario, arguments.realizations)?;
     let mut systems = vec![("GREEDY".to_owned(), evaluate_greedy(&world, &drawn))];
-    if arguments.planner {
-        systems.push(("PLANNER".to_owned(), evaluate_planner(&world, &drawn)));
-    }
     if let Some(folder) = &arguments.run {
         let learned = learned(folder)?;
         let mut network = Network::new(Shape::actor(), &learned.actor);

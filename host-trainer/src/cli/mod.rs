@@ -2,6 +2,7 @@
 
 mod evaluate;
 mod export;
+mod oracle;
 mod train;
 
 use anyhow::Result;
@@ -22,8 +23,12 @@ enum Command {
     /// Teach a policy what a planner with full knowledge does; resumes like train. Of the settings it uses the
     /// missions, the batch (batch x preferences lessons), the replay size and the learning rates.
     Distil(train::DistilArguments),
+    /// Let a policy that was taught learn from its own flights (proximal policy optimisation); resumes like train.
+    Refine(train::RefineArguments),
     /// Print the paper's metrics of a model, a checkpoint and GREEDY.
     Evaluate(evaluate::Arguments),
+    /// Find out what a planner that knows everything would reach, and what nobody can exceed.
+    Oracle(oracle::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
     Export(export::Arguments),
 }
@@ -32,7 +37,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.command {
         Command::Train(arguments) => train::run(arguments),
         Command::Distil(arguments) => train::distil(arguments),
+        Command::Refine(arguments) => train::refine(arguments),
         Command::Evaluate(arguments) => evaluate::run(arguments),
+        Command::Oracle(arguments) => oracle::run(arguments),
         Command::Export(arguments) => export::run(arguments),
     }
 }

@@ -3,6 +3,7 @@
 use super::evaluate::learned;
 use anyhow::{Context, Result};
 use gleaner_host_trainer::distil::Distillation;
+use gleaner_host_trainer::refine::Refinement;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::train::{CURVE, Learned, Run, Tables};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -31,6 +32,16 @@ pub struct DistilArguments {
     /// Begin with what the run in this folder has learned.
     #[arg(long)]
     from: Option<PathBuf>,
+    #[command(flatten)]
+    usual: Arguments,
+}
+
+/// What only the refinement takes.
+#[derive(Debug, clap::Args)]
+pub struct RefineArguments {
+    /// Begin with what the run in this folder has learned.
+    #[arg(long)]
+    from: PathBuf,
     #[command(flatten)]
     usual: Arguments,
 }
@@ -84,7 +95,34 @@ pub fn distil(arguments: &DistilArguments) -> Result<()> {
     Ok(())
 }
 
-/// What both ways of learning show and leave in the folder.
+/// Learns from its own flights: refinement.
+pub fn refine(arguments: &RefineArguments) -> Result<()> {
+    let from = learned(&arguments.from)?;
+    let arguments = &arguments.usual;
+    let mut desk = Desk::open(arguments)?;
+    let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, &from)?;
+    desk.begin(run.update());
+    while !run.is_done() {
+        let findings = run.advance()?;
+        desk.bar.set_position(run.update());
+        if desk.validation_is_due(run.update()) {
+            let tables = run.validate(&mut desk.best)?;
+            let line = serde_json::json!({ "update": run.update(), "losses": findings, "tables": &tables });
+            let of_losses = format!(
+                "critic {:.4}  entropy {:.3}  divergence {:.4}",
+                findings.critic, findings.entropy, findings.divergence
+            );
+            desk.report(&line, run.update(), &of_losses, &tables)?;
+        }
+        if desk.checkpoint_is_due(run.update()) {
+            run.save(&arguments.out)?;
+        }
+    }
+    desk.end();
+    Ok(())
+}
+
+/// What all ways of learning show and leave in the folder.
 struct Desk<'a> {
     arguments: &'a Arguments,
     bar: ProgressBar,

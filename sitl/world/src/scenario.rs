@@ -122,6 +122,15 @@ impl Scenario {
         Scenario { battery, ..self }
     }
 
+    /// The same in another city: start and terminal on the open cells nearest to these, of equals the first.
+    #[must_use]
+    pub fn in_city(self, city: &City) -> Scenario {
+        let open_near = |zone: Cell| {
+            city.open_cells().iter().copied().min_by_key(|cell| cell.manhattan(zone)).unwrap_or(zone)
+        };
+        Scenario { start: open_near(self.start), terminal: open_near(self.terminal), ..self }
+    }
+
     /// Moves of the shortest mission on an open map. Two if start and terminal are one cell: only a *move* into the
     /// terminal ends a mission.
     #[must_use]

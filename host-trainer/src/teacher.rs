@@ -1,12 +1,13 @@
-//! A planner with full knowledge of map, channel and devices: the teacher.
+//! The teacher: a planner with full knowledge of map, channel and devices that plans as a pupil could.
 //!
-//! A plan is a tour: devices to visit in order, then the terminal. At each stop the aircraft goes as near as the stop
+//! A plan is a list of devices to visit in order, then the terminal. At each stop the aircraft goes as near as the stop
 //! says and hovers until the device is empty. Plans are judged by flying them in the mean: each slot brings what the
-//! channel's expected rate says, from whichever device is heard best in the mean. The best tour is searched by
+//! channel's expected rate says, from whichever device is heard best in the mean. The best one is searched by
 //! insertion, removal, exchange, and by how near each stop is.
 //!
-//! The aircraft has none of this knowledge; it sees tokens. What it learns from the planner is what the tokens let
-//! it guess.
+//! [`crate::planner`] finds better tours. It is the worse teacher: it hovers wherever the map makes it pay, and its
+//! search is random, so its pupils, who see neither, learned more slowly (RD, w = (1, 0), after 6,000 updates: 68 %
+//! of the data against 72 %).
 
 use crate::flight::Flight;
 use crate::greedy::approach;
@@ -44,14 +45,14 @@ struct Stop {
 
 /// Expected data per slot of a link by its mean SNR, with and without line of sight.
 #[derive(Debug)]
-pub struct Planner {
+pub struct Teacher {
     world: Arc<World>,
     rates: [Vec<f32>; 2],
 }
 
-/// One mission as the planner knows it: per device and cell, mean SNR (dB) and expected data per slot.
+/// One mission as the teacher knows it: per device and cell, mean SNR (dB) and expected data per slot.
 #[derive(Clone, Debug)]
-pub struct KnownMission {
+pub struct Course {
     grid: Grid,
     links: Vec<Vec<(f32, f32)>>,
     initial_units: f32,
@@ -92,10 +93,10 @@ impl MeanFlight {
     }
 }
 
-impl Planner {
+impl Teacher {
     /// Tabulates the channel.
     #[must_use]
-    pub fn new(world: Arc<World>) -> Planner {
+    pub fn new(world: Arc<World>) -> Teacher {
         let rates = [false, true].map(|line_of_sight| {
             (0..TABLE_LEN)
                 .map(|index| {
@@ -104,12 +105,12 @@ impl Planner {
                 })
                 .collect()
         });
-        Planner { world, rates }
+        Teacher { world, rates }
     }
 
     /// What there is to know about a mission.
     #[must_use]
-    pub fn study(&self, realization: &Realization) -> KnownMission {
+    pub fn study(&self, realization: &Realization) -> Course {
         let city = self.world.city();
         let link = |device: Cell, uav: Cell| {
             let snr_db = self.world.mean_snr(device, uav).map_or(f32::NEG_INFINITY, |snr| snr.0);
@@ -124,11 +125,11 @@ impl Planner {
             .map(|device| city.grid().cells().map(|uav| link(device.cell, uav)).collect())
             .collect();
         let initial_units = realization.devices().iter().map(|device| device.data_units).sum();
-        KnownMission { grid: city.grid(), links, initial_units, tour: None }
+        Course { grid: city.grid(), links, initial_units, tour: None }
     }
 }
 
-impl KnownMission {
+impl Course {
     /// The action that begins the best tour that is found from where the flight is, inside the guard's mask.
     /// Remembers the tour, and begins the next search from it.
     ///
@@ -139,7 +140,7 @@ impl KnownMission {
         self.plan(flight).0
     }
 
-    /// [`KnownMission::advise`], and what each action is worth when the tour is flown after it: a distribution over
+    /// [`Course::advise`], and what each action is worth when the tour is flown after it: a distribution over
     /// the allowed actions, in which those that lose nothing share the probability.
     ///
     /// # Panics

@@ -1,0 +1,81 @@
+//! The oracle: what a planner that knows map, channel and devices plans for, and what nobody can exceed.
+
+use crate::bound::Bounder;
+use crate::evaluation::test_preferences;
+use crate::flight::Reward;
+use crate::planner::{DEVICES_MAX, Effort, Problem, Rates, State, Tour};
+use gleaner_world::{Realization, World};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// The largest weight of data that is planned with: of tours that bring the same, the shorter one is the better.
+const THRIFT: f32 = 0.99;
+/// Steps towards a low bound.
+const BOUND_STEPS: usize = 120;
+
+/// The oracle in one setting: a line of the file that `gleaner-train oracle` writes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OracleSetting {
+    /// `rd` or `rb`.
+    pub scenario: String,
+    /// Number of devices, K.
+    pub devices: usize,
+    /// Battery units at the start, B.
+    pub battery: u16,
+    /// Realizations 0 to N - 1.
+    pub realizations: u64,
+    /// For each test preference and each realization, what the best tour brings in the mean.
+    pub missions: Vec<Vec<Reward>>,
+    /// For each realization, percent of the data that no policy can exceed in the mean.
+    pub upper_bound_percent: Vec<f32>,
+}
+
+/// How hard to look for the best tour of a mission under one preference: two searches, one of them from the best
+/// tour of the preference before.
+#[derive(Clone, Copy, Debug)]
+pub struct Thoroughness {
+    /// Tours that each search flies in the mean.
+    pub tours: u32,
+}
+
+/// One mission under every test preference, and its bound at w = (1, 0) in percent.
+#[must_use]
+pub fn consult(
+    world: &World,
+    rates: &Rates,
+    realization: &Realization,
+    thoroughness: Thoroughness,
+) -> (Vec<Reward>, f32) {
+    let known = rates.study(realization);
+    let mut remaining = [0.0; DEVICES_MAX];
+    for (remaining, device) in remaining.iter_mut().zip(realization.devices()) {
+        *remaining = device.data_units;
+    }
+    let state = State {
+        cell: realization.start(),
+        hovers_left: (2.0 * realization.battery().0).floor() as i32,
+        remaining,
+        collected: 0.0,
+        over: false,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut tour = Tour::default();
+    let rewards: Vec<Reward> = test_preferences()
+        .iter()
+        .map(|preference| {
+            let problem = Problem { known: &known, state: &state, w_data: preference.w_data().min(THRIFT) };
+            let anew = Effort { tours: thoroughness.tours, temperatures: [5.0, 0.03] };
+            let onward = Effort { tours: thoroughness.tours, temperatures: [1.5, 0.03] };
+            let first = problem.anneal(Tour::default(), anew, &mut rng);
+            let second = problem.anneal(tour.clone(), onward, &mut rng);
+            tour = if second.0 > first.0 { second.1 } else { first.1 };
+            let mut end = state;
+            end.finish(&known, &tour);
+            let percent = 100.0 * end.collected / known.initial_units().max(1.0);
+            [percent, -0.5 * (state.hovers_left - end.hovers_left) as f32]
+        })
+        .collect();
+    let bound = Bounder::new(world, realization).bound(1.0, BOUND_STEPS);
+    (rewards, bound.min(100.0))
+}

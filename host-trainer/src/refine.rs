@@ -1,0 +1,441 @@
+//! Refinement: a policy that has been taught goes on to learn from its own flights.
+//!
+//! The teacher knows what the aircraft does not, so even the best pupil copies decisions that only make sense for
+//! someone who knows. Only what the policy itself earns can correct that. Proximal policy optimisation (Schulman et al. 2017) with vector values:
+//! one critic predicts data and energy still to come under the preference, advantages are estimated for each
+//! objective (Schulman et al. 2016) and weighed by the preference, as the paper weighs its values.
+
+use crate::checkpoint::{self, CheckpointError};
+use crate::evaluation::Network;
+use crate::flight::{Flight, Reward};
+use crate::mosac::Distribution;
+use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
+use crate::settings::Settings;
+use crate::train::{Learned, Tables, TrainError, Validation};
+use crate::variety::{Setting, Variety};
+use gleaner_units::{Action, ActionMask};
+use gleaner_world::World;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::Arc;
+
+/// The checkpoint's name inside the output folder.
+pub const CHECKPOINT: &str = "refine.checkpoint";
+/// Missions in the air at once, and slots that each flies between two updates.
+const FLIGHTS: usize = 128;
+const SLOTS: usize = 32;
+/// Passes over what was flown, and samples of one gradient step.
+const PASSES: usize = 2;
+const MINIBATCH: usize = 512;
+/// How far the probability of an action may move from what was flown.
+const CLIP: f32 = 0.15;
+/// Share of the next slot's advantage: bias against noise.
+const TRACE: f32 = 0.97;
+/// Weight of the entropy, in standard deviations of the advantage.
+const ENTROPY: f32 = 0.003;
+/// The critic sees data in this many percent, and energy in this many units.
+const VALUE_SCALE: Reward = [40.0, 40.0];
+/// The critic's step size in those of the actor.
+const CRITIC_RATE: f32 = 3.0;
+/// Updates in which only the critic learns.
+const CRITIC_FIRST: u64 = 25;
+/// The pupil's logits are multiplied by this, so that it flies what it holds for best.
+const CONFIDENCE: f32 = 2.5;
+/// Share of the actor that its running average takes over per update.
+const AVERAGING: f32 = 0.03;
+
+/// One slot as it was flown.
+struct Experience {
+    sample: Sample,
+    mask: ActionMask,
+    action: Action,
+    log_probability: f32,
+    reward: Reward,
+    value: Reward,
+    over: bool,
+}
+
+/// What an update saw: means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// Half the squared error of the critic, scaled.
+    pub critic: f32,
+    /// Entropy of the policy, nats.
+    pub entropy: f32,
+    /// How far the policy has moved from what was flown, nats.
+    pub divergence: f32,
+}
+
+/// A flight in the air, and how it came there.
+struct Going {
+    mission: u64,
+    actions: Vec<u8>,
+    flight: Flight,
+}
+
+/// A run of refinement.
+pub struct Refinement {
+    method: String,
+    settings: Settings,
+    variety: Variety,
+    world: Arc<World>,
+    validation: Validation,
+    flights: Vec<Going>,
+    kept: Kept,
+    rng: ChaCha8Rng,
+    batch: Batch,
+    workspace: Workspace,
+}
+
+/// What the checkpoint keeps.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    settings: Settings,
+    actor: Vec<f32>,
+    averaged: Vec<f32>,
+    critic: Vec<f32>,
+    adams: [Adam; 2],
+    flights: Vec<(u64, Vec<u8>)>,
+    next_mission: u64,
+    update: u64,
+    steps: u64,
+    rng_word: u128,
+}
+
+const fn critic_shape() -> Shape {
+    Shape { outputs: 2, ..Shape::critic() }
+}
+
+impl Refinement {
+    /// Goes on from the checkpoint in `folder`, or begins with the actor of `from`.
+    ///
+    /// # Errors
+    /// The checkpoint is damaged or of another run; no mission could be drawn.
+    pub fn open(settings: Settings, folder: &Path, from: &Learned) -> Result<Refinement, TrainError> {
+        let path = folder.join(CHECKPOINT);
+        let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
+        let kept = if path.exists() {
+            let mut kept: Kept = checkpoint::load(&path)?;
+            // A finished run may be prolonged.
+            kept.settings.updates = settings.updates;
+            if kept.settings != settings {
+                return Err(TrainError::OtherSettings { path });
+            }
+            rng.set_word_pos(kept.rng_word);
+            kept
+        } else {
+            let critic = critic_shape().initialise(&mut rng);
+            let actor = confident(&from.actor);
+            Kept {
+                averaged: actor.clone(),
+                adams: [Adam::new(actor.len(), 0.0), Adam::new(critic.len(), 0.0)],
+                actor,
+                critic,
+                flights: Vec::new(),
+                next_mission: 0,
+                update: 0,
+                steps: from.steps,
+                rng_word: 0,
+                settings: settings.clone(),
+            }
+        };
+        let world = Arc::new(World::default_world());
+        let before = from.settings.command_line(&from.method, "FIRST");
+        let mut run = Refinement {
+            method: format!(
+                "{} && gleaner-train refine --from FIRST",
+                before.trim_start_matches("gleaner-train ")
+            ),
+            variety: Variety::new(&world, &settings),
+            validation: Validation::draw(&world, &settings)?,
+            settings,
+            world,
+            flights: Vec::new(),
+            kept,
+            rng,
+            batch: Batch::new(),
+            workspace: Workspace::new(),
+        };
+        for (mission, actions) in std::mem::take(&mut run.kept.flights) {
+            let mut going = run.begin(mission)?;
+            for action in actions {
+                going.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
+            }
+            run.flights.push(going);
+        }
+        while run.flights.len() < FLIGHTS {
+            let going = run.next_flight()?;
+            run.flights.push(going);
+        }
+        Ok(run)
+    }
+
+    fn begin(&self, mission: u64) -> Result<Going, TrainError> {
+        let Setting { world, reports_missing } = self.variety.setting(mission);
+        let drawn = self.settings.mission(world, mission)?;
+        let flight = Flight::new(world, &drawn.realization, drawn.seed, drawn.preference)?
+            .with_reports_missing(reports_missing, drawn.seed);
+        Ok(Going { mission, actions: Vec::new(), flight })
+    }
+
+    fn next_flight(&mut self) -> Result<Going, TrainError> {
+        let mission = self.kept.next_mission;
+        self.kept.next_mission += 1;
+        self.begin(mission)
+    }
+
+    /// Updates done.
+    #[must_use]
+    pub const fn update(&self) -> u64 {
+        self.kept.update
+    }
+
+    /// Whether the settings ask for no more updates.
+    #[must_use]
+    pub const fn is_done(&self) -> bool {
+        self.kept.update >= self.settings.updates
+    }
+
+    /// Flies every mission for some slots, and learns from it.
+    ///
+    /// # Errors
+    /// No mission could be drawn.
+    pub fn advance(&mut self) -> Result<Findings, TrainError> {
+        let mut flown: Vec<Vec<Experience>> = (0..FLIGHTS).map(|_| Vec::with_capacity(SLOTS)).collect();
+        for _ in 0..SLOTS {
+            self.fly(&mut flown)?;
+        }
+        let samples = self.flights.iter().map(|going| going.flight.observe().with(going.flight.preference()));
+        let ahead = self.values(samples.collect());
+        let mut lessons = Vec::with_capacity(FLIGHTS * SLOTS);
+        for (experiences, ahead) in flown.into_iter().zip(ahead) {
+            lessons.extend(judge(experiences, ahead));
+        }
+        let spread = (lessons.iter().map(|lesson| lesson.advantage * lesson.advantage).sum::<f32>()
+            / lessons.len() as f32)
+            .sqrt()
+            .max(1e-3);
+        lessons.iter_mut().for_each(|lesson| lesson.advantage /= spread);
+        let findings = self.learn(&lessons);
+        self.kept.update += 1;
+        let share = AVERAGING.max(1.0 / self.kept.update as f32);
+        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
+        Ok(findings)
+    }
+
+    /// One slot of every flight.
+    fn fly(&mut self, flown: &mut [Vec<Experience>]) -> Result<(), TrainError> {
+        let samples: Vec<Sample> =
+            self.flights.iter().map(|going| going.flight.observe().with(going.flight.preference())).collect();
+        let logits = Network::new(Shape::actor(), &self.kept.actor).logits(samples.iter().copied());
+        let values = self.values(samples.clone());
+        for (index, ((sample, logits), value)) in samples.into_iter().zip(logits).zip(values).enumerate() {
+            let going = &mut self.flights[index];
+            let mask = going.flight.mask();
+            let policy = Distribution::new(&logits, mask);
+            let action = policy.pick(self.rng.random());
+            let reward = going.step(action);
+            let over = going.flight.is_over();
+            let log_probability = policy.log_probability[action.index()];
+            flown[index].push(Experience { sample, mask, action, log_probability, reward, value, over });
+            self.kept.steps += 1;
+            if over {
+                self.flights[index] = self.next_flight()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the critic expects from these states: percent of data, and minus battery units.
+    fn values(&mut self, samples: Vec<Sample>) -> Vec<Reward> {
+        self.batch.clear();
+        samples.iter().for_each(|sample| self.batch.push_sample(sample));
+        let outputs = net::forward(&critic_shape(), &self.kept.critic, &self.batch, &mut self.workspace);
+        let unscale = |value: &[f32; 2]| [value[0] * VALUE_SCALE[0], value[1] * VALUE_SCALE[1]];
+        outputs.as_chunks::<2>().0.iter().map(unscale).collect()
+    }
+
+    fn learn(&mut self, lessons: &[Lesson]) -> Findings {
+        let rate = self.settings.learning_rate_at(self.kept.update);
+        let mut order: Vec<usize> = (0..lessons.len()).collect();
+        let (mut findings, mut count) = (Findings::default(), 0.0);
+        for _ in 0..PASSES {
+            for last in (1..order.len()).rev() {
+                order.swap(last, self.rng.random_range(0..=last));
+            }
+            for chosen in order.chunks(MINIBATCH) {
+                let chosen: Vec<&Lesson> = chosen.iter().map(|&index| &lessons[index]).collect();
+                self.batch.clear();
+                chosen.iter().for_each(|lesson| self.batch.push_sample(&lesson.sample));
+                findings.critic += self.teach_critic(&chosen, rate * CRITIC_RATE);
+                if self.kept.update >= CRITIC_FIRST {
+                    let (entropy, divergence) = self.teach_actor(&chosen, rate);
+                    findings.entropy += entropy;
+                    findings.divergence += divergence;
+                }
+                count += 1.0;
+            }
+        }
+        Findings {
+            critic: findings.critic / count,
+            entropy: findings.entropy / count,
+            divergence: findings.divergence / count,
+        }
+    }
+
+    fn teach_critic(&mut self, lessons: &[&Lesson], rate: f32) -> f32 {
+        let scale = 1.0 / lessons.len() as f32;
+        let mut gradients = vec![0.0; self.kept.critic.len()];
+        let mut loss = 0.0;
+        net::forward_backward(
+            &critic_shape(),
+            &self.kept.critic,
+            &self.batch,
+            &mut self.workspace,
+            |range, outputs, gradients| {
+                let rows = outputs.as_chunks::<2>().0.iter().zip(gradients.as_chunks_mut::<2>().0);
+                for ((values, gradients), lesson) in rows.zip(&lessons[range]) {
+                    for objective in 0..2 {
+                        let error = values[objective] - lesson.gained[objective] / VALUE_SCALE[objective];
+                        loss += 0.5 * scale * error * error;
+                        gradients[objective] = scale * error;
+                    }
+                }
+            },
+            &mut gradients,
+        );
+        self.kept.adams[1].lr = rate;
+        self.kept.adams[1].step(&mut self.kept.critic, &gradients);
+        loss
+    }
+
+    /// Gives mean entropy and divergence.
+    fn teach_actor(&mut self, lessons: &[&Lesson], rate: f32) -> (f32, f32) {
+        let scale = 1.0 / lessons.len() as f32;
+        let mut gradients = vec![0.0; self.kept.actor.len()];
+        let (mut entropy, mut divergence) = (0.0, 0.0);
+        net::forward_backward(
+            &Shape::actor(),
+            &self.kept.actor,
+            &self.batch,
+            &mut self.workspace,
+            |range, outputs, gradients| {
+                let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
+                for ((logits, gradients), lesson) in rows.zip(&lessons[range]) {
+                    let (h, kl) = lesson.gradient(logits, gradients);
+                    gradients.iter_mut().for_each(|gradient| *gradient *= scale);
+                    entropy += scale * h;
+                    divergence += scale * kl;
+                }
+            },
+            &mut gradients,
+        );
+        self.kept.adams[0].lr = rate;
+        self.kept.adams[0].step(&mut self.kept.actor, &gradients);
+        (entropy, divergence)
+    }
+
+    /// Judges the averaged actor, and offers it to `best`.
+    ///
+    /// # Errors
+    /// The network's answer is not a number.
+    pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
+        let tables = self.validation.judge(&self.world, &self.kept.averaged)?;
+        let score = tables.score();
+        if best.as_ref().is_none_or(|best| score > best.score) {
+            *best = Some(Learned {
+                method: self.method.clone(),
+                settings: self.settings.clone(),
+                actor: self.kept.averaged.clone(),
+                update: self.kept.update,
+                steps: self.kept.steps,
+                score,
+            });
+        }
+        Ok(tables)
+    }
+
+    /// Writes everything that the next update depends on.
+    ///
+    /// # Errors
+    /// The disk; the last good checkpoint is then still there.
+    pub fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
+        self.kept.rng_word = self.rng.get_word_pos();
+        self.kept.flights = self.flights.iter().map(|going| (going.mission, going.actions.clone())).collect();
+        checkpoint::save(&folder.join(CHECKPOINT), &self.kept)
+    }
+}
+
+impl Going {
+    fn step(&mut self, action: Action) -> Reward {
+        self.actions.push(action.index() as u8);
+        self.flight.step(action)
+    }
+}
+
+/// One slot, judged.
+struct Lesson {
+    sample: Sample,
+    mask: ActionMask,
+    action: Action,
+    log_probability: f32,
+    /// How much better it went than expected, under the preference.
+    advantage: f32,
+    /// What was gained from here on: the critic's target.
+    gained: Reward,
+}
+
+/// Generalised advantages of one flight's slots; `ahead` is what the critic expects after the last.
+fn judge(experiences: Vec<Experience>, ahead: Reward) -> Vec<Lesson> {
+    let mut lessons = Vec::with_capacity(experiences.len());
+    let (mut next_value, mut next_advantage) = (ahead, [0.0; 2]);
+    for experience in experiences.into_iter().rev() {
+        if experience.over {
+            (next_value, next_advantage) = ([0.0; 2], [0.0; 2]);
+        }
+        let advantage: Reward = std::array::from_fn(|objective| {
+            experience.reward[objective] + next_value[objective] - experience.value[objective]
+                + TRACE * next_advantage[objective]
+        });
+        let [w_data, w_energy] = experience.sample.preference;
+        lessons.push(Lesson {
+            sample: experience.sample,
+            mask: experience.mask,
+            action: experience.action,
+            log_probability: experience.log_probability,
+            advantage: w_data * advantage[0] + w_energy * advantage[1],
+            gained: std::array::from_fn(|objective| advantage[objective] + experience.value[objective]),
+        });
+        (next_value, next_advantage) = (experience.value, advantage);
+    }
+    lessons
+}
+
+impl Lesson {
+    /// The gradient of the clipped objective and the entropy for the logits; gives entropy and divergence.
+    fn gradient(&self, logits: &[f32; Action::COUNT], gradient: &mut [f32; Action::COUNT]) -> (f32, f32) {
+        let policy = Distribution::new(logits, self.mask);
+        let change = policy.log_probability[self.action.index()] - self.log_probability;
+        let ratio = change.exp();
+        let is_clipped = if self.advantage > 0.0 { ratio > 1.0 + CLIP } else { ratio < 1.0 - CLIP };
+        let push = if is_clipped { 0.0 } else { self.advantage * ratio };
+        let entropy = -policy.expectation(|action| policy.log_probability[action]);
+        for (action, gradient) in gradient.iter_mut().enumerate() {
+            let p = policy.probability[action];
+            let chosen = if action == self.action.index() { 1.0 } else { 0.0 };
+            *gradient = -push * (chosen - p) + ENTROPY * p * (policy.log_probability[action] + entropy);
+        }
+        (entropy, ratio - 1.0 - change)
+    }
+}
+
+/// The same decisions, made with more confidence.
+fn confident(actor: &[f32]) -> Vec<f32> {
+    let mut actor = actor.to_vec();
+    for tensor in Shape::actor().tensors().iter().filter(|tensor| tensor.name.starts_with("head.1.")) {
+        actor[tensor.offset..tensor.offset + tensor.len()].iter_mut().for_each(|x| *x *= CONFIDENCE);
+    }
+    actor
+}
