@@ -15,11 +15,16 @@
 //! [`export`] writes the model. The network itself is [`net`].
 
 pub mod checkpoint;
+pub mod ddqn;
 pub mod distil;
+pub mod encoding;
 pub mod evaluation;
 pub mod export;
 pub mod flight;
 pub mod greedy;
+pub mod learned;
+pub mod learner;
+pub mod maps;
 pub mod mosac;
 pub mod net;
 pub mod observation;
@@ -27,4 +32,6 @@ pub mod pareto;
 pub mod planner;
 pub mod replay;
 pub mod settings;
+pub mod system;
 pub mod train;
+pub mod validation;

@@ -161,6 +161,18 @@ impl Settings {
         command
     }
 
+    /// Target entropy at this update, as a share of the largest possible.
+    #[must_use]
+    pub fn entropy_target_at(&self, update: u64) -> f32 {
+        mix(self.entropy_start, self.entropy_end, self.annealed(update))
+    }
+
+    /// Temperature of the exploring softmax at this update.
+    #[must_use]
+    pub fn heat_at(&self, update: u64) -> f32 {
+        mix(self.heat_start, self.heat_end, self.annealed(update))
+    }
+
     /// How far along the annealing is, 0 to 1.
     #[must_use]
     pub fn annealed(&self, update: u64) -> f32 {
@@ -174,6 +186,11 @@ impl Settings {
         let falling = ((progress - 0.5) * 2.0).clamp(0.0, 1.0) as f32;
         self.learning_rate + (self.learning_rate_end - self.learning_rate) * falling
     }
+}
+
+/// The line from start to end.
+pub(crate) fn mix(start: f32, end: f32, progress: f32) -> f32 {
+    start + (end - start) * progress
 }
 
 /// Uniform over the preferences.

@@ -2,9 +2,8 @@
 
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{
-    Engine, Network, Table, evaluate, evaluate_greedy, evaluate_planner, realizations,
+    Engine, Table, evaluate, evaluate_greedy, evaluate_planner, realizations,
 };
-use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{ScenarioKind, World};
@@ -56,8 +55,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if let Some(folder) = &arguments.run {
         let learned = learned(folder)?;
-        let mut network = Network::new(Shape::actor(), &learned.actor);
-        systems.push((format!("{}", folder.display()), evaluate(&world, &drawn, &mut network)?));
+        let mut decider = learned.decider();
+        systems.push((format!("{}", folder.display()), evaluate(&world, &drawn, &mut *decider)?));
     }
     if let Some(path) = &arguments.model {
         let mut policy = super::export::load_model(path)?;
