@@ -1,21 +1,15 @@
 //! Milliseconds of one update, least of a few rounds, as one line that a script can read. The
 //! command is `python3 host-trainer/scripts/compare_with_pytorch.py`.
 
+mod processor;
 mod twin;
 
+use processor::cpu_ms;
 use std::time::Instant;
 
 const WARM_UP: usize = 5;
 const ROUNDS: usize = 6;
 const UPDATES_A_ROUND: usize = 20;
-
-/// Milliseconds that this thread has been running, by the kernel's count; it moves on at each
-/// scheduler tick, so rounds must be long. Only Linux tells.
-fn cpu_ms() -> Option<f64> {
-    let line = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let nanoseconds: f64 = line.split_whitespace().next()?.parse().ok()?;
-    Some(nanoseconds * 1e-6)
-}
 
 fn main() {
     let mut learner = twin::Learner::new();

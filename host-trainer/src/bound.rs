@@ -134,7 +134,7 @@ impl Bounder {
             let progress = step as f32 / steps as f32;
             let between = |[from, to]: [f32; 2]| from * libm::powf(to / from, progress);
             // The mean of the best link guides the steps. Certified below.
-            let value = self.solve(scale, w_energy, &prices, Some(between(TEMPERATURE)), greatest_mean);
+            self.solve(scale, w_energy, &prices, Some(between(TEMPERATURE)), greatest_mean);
             let slopes = self.slopes(scale, &prices);
             flatten(&prices, &mut flat);
             let mut gradient = vec![0.0; flat.len()];
@@ -146,9 +146,6 @@ impl Bounder {
                 for (mu, flat) in prices.mu.iter_mut().zip(&flat[1..]) {
                     *mu = flat.max(0.0);
                 }
-            }
-            if std::env::var("BX").is_ok() && step % 20 == 0 {
-                eprintln!("{step} {value}");
             }
         }
         let weights = self.weights;

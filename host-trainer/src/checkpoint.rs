@@ -61,11 +61,77 @@ pub fn save<T: Serialize>(path: &Path, value: &T) -> Result<(), CheckpointError>
     })
 }
 
+/// [`save`], with the name of what the value belongs to before it.
+///
+/// # Errors
+/// Those of [`save`].
+pub fn save_named<T: Serialize>(path: &Path, name: &str, value: &T) -> Result<(), CheckpointError> {
+    save(path, &(name, value))
+}
+
+/// A checkpoint whose name is known and whose value is not yet.
+#[derive(Debug)]
+pub struct Named {
+    path: PathBuf,
+    name: String,
+    payload: Vec<u8>,
+    /// Where the value begins in the payload.
+    value_at: usize,
+}
+
+impl Named {
+    /// What the value belongs to.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The value.
+    ///
+    /// # Errors
+    /// It is of another type or version.
+    pub fn value<T: DeserializeOwned>(&self) -> Result<T, CheckpointError> {
+        self.decode(self.value_at)
+    }
+
+    /// What a file from before there were names holds: the first string in it is no name but part of the value.
+    ///
+    /// # Errors
+    /// Those of [`Named::value`].
+    pub fn unnamed<T: DeserializeOwned>(&self) -> Result<T, CheckpointError> {
+        self.decode(0)
+    }
+
+    fn decode<T: DeserializeOwned>(&self, from: usize) -> Result<T, CheckpointError> {
+        match postcard::take_from_bytes(&self.payload[from..]) {
+            Ok((value, [])) => Ok(value),
+            Ok(_) | Err(_) => Err(CheckpointError::Format { path: self.path.clone() }),
+        }
+    }
+}
+
+/// Reads what [`save_named`] wrote.
+///
+/// # Errors
+/// See [`CheckpointError`].
+pub fn load_named(path: &Path) -> Result<Named, CheckpointError> {
+    let payload = payload(path)?;
+    let (name, rest) = postcard::take_from_bytes::<String>(&payload)
+        .map_err(|_| CheckpointError::Format { path: path.to_owned() })?;
+    let value_at = payload.len() - rest.len();
+    Ok(Named { path: path.to_owned(), name, payload, value_at })
+}
+
 /// Reads a checkpoint back.
 ///
 /// # Errors
 /// See [`CheckpointError`].
 pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CheckpointError> {
+    postcard::from_bytes(&payload(path)?).map_err(|_| CheckpointError::Format { path: path.to_owned() })
+}
+
+/// The payload of a file that is whole.
+fn payload(path: &Path) -> Result<Vec<u8>, CheckpointError> {
     let io = |source| CheckpointError::Io { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     File::open(path).map_err(io)?.read_to_end(&mut bytes).map_err(io)?;
@@ -75,10 +141,7 @@ pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CheckpointError> {
     let (crc, payload) = rest.split_first_chunk::<4>().ok_or_else(damaged)?;
     let whole =
         u64::from_le_bytes(*len) == payload.len() as u64 && u32::from_le_bytes(*crc) == CRC.checksum(payload);
-    if !whole {
-        return Err(damaged());
-    }
-    postcard::from_bytes(payload).map_err(|_| CheckpointError::Format { path: path.to_owned() })
+    if whole { Ok(payload.to_vec()) } else { Err(damaged()) }
 }
 
 #[cfg(test)]
@@ -102,6 +165,20 @@ mod tests {
         flipped[500] ^= 1;
         fs::write(&path, &flipped).unwrap();
         assert!(matches!(load::<Vec<f32>>(&path), Err(CheckpointError::Damaged { .. })));
+    }
+
+    #[test]
+    fn a_named_checkpoint_tells_its_name_first_and_leaves_nothing_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.checkpoint");
+        save_named(&path, "mosac-cgl", &(7u32, 0.5f32)).unwrap();
+        let named = load_named(&path).unwrap();
+        assert_eq!(named.name(), "mosac-cgl");
+        assert_eq!(named.value::<(u32, f32)>().unwrap(), (7, 0.5));
+        assert_eq!(named.unnamed::<(String, u32, f32)>().unwrap().1, 7);
+        assert!(matches!(named.value::<u32>(), Err(CheckpointError::Format { .. })), "four bytes left over");
+        save(&path, &u64::MAX).unwrap();
+        assert!(matches!(load_named(&path), Err(CheckpointError::Format { .. })));
     }
 
     #[test]

@@ -11,6 +11,7 @@ use crate::mosac::Distribution;
 use crate::net::{self, Adam, Batch, Shape, Workspace};
 use crate::observation::Observation;
 use crate::settings::Settings;
+use crate::system::System;
 use crate::teacher::{Course, Teacher};
 use crate::train::{Learned, TrainError, Validation};
 use gleaner_policy::Preference;
@@ -270,6 +271,7 @@ impl Distillation {
         let score = tables.score();
         if best.as_ref().is_none_or(|best| score > best.score) {
             *best = Some(Learned {
+                system: System::MosacAtt,
                 method: self.method.clone(),
                 settings: self.settings.clone(),
                 actor: self.kept.averaged.clone(),

@@ -3,7 +3,7 @@
 use crate::observation::Observation;
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
-use gleaner_units::{Action, ActionMask, BatteryUnits, CellSet};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
 use gleaner_world::{Episode, Realization, ScenarioError, Seed, Stream, World};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -19,6 +19,7 @@ pub struct Flight {
     episode: Episode,
     guard: Guard,
     preference: Preference,
+    start: Cell,
     total: Reward,
     reports: Option<Reports>,
 }
@@ -62,7 +63,7 @@ impl Flight {
         let map = CellSet::full(world.city().grid());
         let guard = Guard::new(&map, realization.terminal(), BatteryUnits(0.0))
             .expect("the terminal of a scenario lies inside a map of more than one cell");
-        Ok(Flight { episode, guard, preference, total: [0.0; 2], reports: None })
+        Ok(Flight { episode, guard, preference, start: realization.start(), total: [0.0; 2], reports: None })
     }
 
     /// Loses this share of the reports, each by chance: the device is then not heard, and its data is that of the
@@ -82,11 +83,10 @@ impl Flight {
     /// What the policy sees now.
     #[must_use]
     pub fn tokens(&self) -> Tokens {
-        let (cell, battery) = (self.episode.uav(), self.episode.battery());
         let situation = Situation {
-            cell,
-            battery,
-            spare: self.guard.spare(cell, battery).unwrap_or(battery),
+            cell: self.episode.uav(),
+            battery: self.episode.battery(),
+            spare: self.spare(),
             terminal: self.episode.terminal(),
             preference: self.preference,
             heights: self.episode.world().city().heights(),
@@ -105,6 +105,19 @@ impl Flight {
     #[must_use]
     pub fn observe(&self) -> Observation {
         Observation::new(&self.tokens())
+    }
+
+    /// What the battery holds beyond the way to the terminal.
+    #[must_use]
+    pub fn spare(&self) -> BatteryUnits {
+        let battery = self.episode.battery();
+        self.guard.spare(self.episode.uav(), battery).unwrap_or(battery)
+    }
+
+    /// Where it began.
+    #[must_use]
+    pub const fn start(&self) -> Cell {
+        self.start
     }
 
     /// What the guard allows now.

@@ -11,16 +11,25 @@
 //!
 //! # How it hangs together
 //! `train` reads top to bottom; what it calls lives beside it: [`flight`] and [`observation`] make samples,
-//! [`replay`] keeps them, [`mosac`] learns from them, [`evaluation`] judges, [`checkpoint`] survives a kill,
-//! [`export`] writes the model. The network itself is [`net`].
+//! [`replay`] keeps them, [`mosac`] and [`ddqn`] learn from them, [`evaluation`] judges, [`checkpoint`] survives a kill,
+//! [`export`] writes the model. The networks are [`net`], and [`system`] names which system learns with which.
+//!
+//! The policies that fly come another way: [`distil`] copies the [`teacher`], who knows what the aircraft cannot see,
+//! and [`refine`] lets the pupil learn from its own flights. What they are measured against is the [`oracle`]: the
+//! best tour that the [`planner`] finds, and a [`bound`] on what anybody could.
 
 pub mod bound;
 pub mod checkpoint;
+pub mod ddqn;
 pub mod distil;
+pub mod encoding;
 pub mod evaluation;
 pub mod export;
 pub mod flight;
 pub mod greedy;
+pub mod learned;
+pub mod learner;
+pub mod maps;
 pub mod mosac;
 pub mod net;
 pub mod observation;
@@ -30,6 +39,8 @@ pub mod planner;
 pub mod refine;
 pub mod replay;
 pub mod settings;
+pub mod system;
 pub mod teacher;
 pub mod train;
+pub mod validation;
 pub mod variety;

@@ -4,62 +4,30 @@
 //! critics; a learned entropy weight nu. Actions that the guard forbids have probability zero everywhere, so the
 //! learner never spends capacity on what cannot be flown.
 
-use crate::net::{self, Adam, Batch, Shape, Workspace};
-use crate::observation::Observation;
-use crate::replay::Transition;
+use crate::encoding::Encoding;
+use crate::learner::{
+    self, ACTIONS, OBJECTIVES, Remembered, Scratch, Trained, VALUES, scalarise, seen_reward,
+};
+use crate::net::{self, Adam, Architecture};
 use crate::settings::Settings;
+use crate::system::System;
 use gleaner_policy::Preference;
 use gleaner_units::{Action, ActionMask};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-
-const ACTIONS: usize = Action::COUNT;
-const OBJECTIVES: usize = 2;
-const VALUES: usize = ACTIONS * OBJECTIVES;
-
-/// One network under training.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Trained {
-    parameters: Vec<f32>,
-    adam: Adam,
-    #[serde(skip)]
-    gradients: Vec<f32>,
-}
-
-impl Trained {
-    fn new(shape: &Shape, rng: &mut ChaCha8Rng) -> Trained {
-        let parameters = shape.initialise(rng);
-        Trained { adam: Adam::new(parameters.len(), 0.0), gradients: Vec::new(), parameters }
-    }
-
-    fn zero_gradients(&mut self) {
-        self.gradients.clear();
-        self.gradients.resize(self.parameters.len(), 0.0);
-    }
-
-    fn descend(&mut self, learning_rate: f32) {
-        self.adam.lr = learning_rate;
-        self.adam.step(&mut self.parameters, &self.gradients);
-    }
-}
+use std::fmt;
 
 /// The networks and what is needed to go on learning.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Learner {
+#[serde(bound = "")]
+pub struct Learner<E: Encoding> {
     actor: Trained,
     critics: [Trained; 2],
     targets: [Vec<f32>; 2],
     log_entropy_weight: Vec<f32>,
     adam_entropy: Adam,
     #[serde(skip)]
-    scratch: Scratch,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Scratch {
-    before: Batch,
-    after: Batch,
-    workspace: Workspace,
+    scratch: Scratch<E>,
 }
 
 /// What an update saw: means over the batch.
@@ -75,22 +43,34 @@ pub struct Losses {
     pub entropy_weight: f32,
 }
 
-/// The step-dependent part of the settings.
-#[derive(Clone, Copy, Debug)]
-pub struct Rates {
-    /// Adam's step size.
-    pub learning_rate: f32,
-    /// Target entropy as a share of the largest possible.
-    pub entropy_target: f32,
+impl fmt::Display for Losses {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Losses { critic, entropy, entropy_weight, .. } = self;
+        write!(f, "critic {critic:.4}  entropy {entropy:.3}  nu {entropy_weight:.5}")
+    }
 }
 
-impl Learner {
-    /// Fresh networks.
-    #[must_use]
-    pub fn new(settings: &Settings, rng: &mut ChaCha8Rng) -> Learner {
-        let critics = [Trained::new(&Shape::critic(), rng), Trained::new(&Shape::critic(), rng)];
+/// The step-dependent part of the settings.
+#[derive(Clone, Copy, Debug)]
+struct Rates {
+    /// Adam's step size.
+    learning_rate: f32,
+    /// Target entropy as a share of the largest possible.
+    entropy_target: f32,
+}
+
+/// A transition under a preference.
+type Sample<'a, E> = (&'a Remembered<E>, Preference);
+
+impl<E: Encoding> learner::Learner for Learner<E> {
+    type Encoding = E;
+    type Losses = Losses;
+    const SYSTEM: System = E::MOSAC;
+
+    fn new(settings: &Settings, rng: &mut ChaCha8Rng) -> Learner<E> {
+        let critics = [Trained::new(&critic::<E>(), rng), Trained::new(&critic::<E>(), rng)];
         Learner {
-            actor: Trained::new(&Shape::actor(), rng),
+            actor: Trained::new(&actor::<E>(), rng),
             targets: critics.each_ref().map(|critic| critic.parameters.clone()),
             critics,
             log_entropy_weight: vec![settings.entropy_weight.ln()],
@@ -99,33 +79,34 @@ impl Learner {
         }
     }
 
-    /// The actor's parameters: what is exported.
-    #[must_use]
-    pub fn actor(&self) -> &[f32] {
+    fn network() -> E::Network {
+        actor::<E>()
+    }
+
+    fn deciding(&self) -> &[f32] {
         &self.actor.parameters
     }
 
-    /// One gradient step of everything. `preferences` holds [`Settings::preferences`] of them per transition.
-    pub fn update(
+    fn update(
         &mut self,
+        encoding: &E,
         settings: &Settings,
-        rates: Rates,
-        transitions: &[&Transition],
+        update: u64,
+        transitions: &[&Remembered<E>],
         preferences: &[Preference],
     ) -> Losses {
+        let rates = Rates {
+            learning_rate: settings.learning_rate_at(update),
+            entropy_target: settings.entropy_target_at(update),
+        };
         let copies = settings.preferences;
         debug_assert_eq!(preferences.len(), transitions.len() * copies);
-        let samples: Vec<(&Transition, Preference)> = preferences
+        let samples: Vec<Sample<'_, E>> = preferences
             .iter()
             .enumerate()
             .map(|(index, &preference)| (transitions[index / copies], preference))
             .collect();
-        self.scratch.before.clear();
-        self.scratch.after.clear();
-        for (transition, preference) in &samples {
-            self.scratch.before.push_sample(&transition.before.with(*preference));
-            self.scratch.after.push_sample(&transition.after.with(*preference));
-        }
+        self.scratch.pack(encoding, transitions, preferences);
         let targets = self.targets(settings, &samples);
         let (critic, values) = self.update_critics(&samples, &targets, rates);
         let (actor, entropy) = self.update_actor(&samples, &values, rates);
@@ -135,30 +116,44 @@ impl Learner {
         Losses { critic, actor, entropy, entropy_weight: self.entropy_weight() }
     }
 
+    fn scores(logits: &[f32], _: Preference) -> [f32; ACTIONS] {
+        std::array::from_fn(|action| logits[action])
+    }
+
+    /// The heated softmax (paper, eq. 20).
+    fn explore(settings: &Settings, update: u64, logits: &[f32; ACTIONS], mask: ActionMask) -> Distribution {
+        let heat = settings.heat_at(update);
+        Distribution::new(&logits.map(|logit| logit / heat), mask)
+    }
+}
+
+fn actor<E: Encoding>() -> E::Network {
+    E::Network::with_outputs(ACTIONS)
+}
+
+fn critic<E: Encoding>() -> E::Network {
+    E::Network::with_outputs(VALUES)
+}
+
+impl<E: Encoding> Learner<E> {
     fn entropy_weight(&self) -> f32 {
         self.log_entropy_weight[0].exp()
     }
 
     /// y = r + gamma E_a' [min(T1, T2) - nu log pi], per objective (paper, eq. 17 with twin critics).
-    fn targets(&mut self, settings: &Settings, samples: &[(&Transition, Preference)]) -> Vec<[f32; 2]> {
+    fn targets(&mut self, settings: &Settings, samples: &[Sample<'_, E>]) -> Vec<[f32; OBJECTIVES]> {
         let nu = self.entropy_weight();
         let Scratch { after, workspace, .. } = &mut self.scratch;
         let logits: Vec<[f32; ACTIONS]> =
-            net::forward(&Shape::actor(), &self.actor.parameters, after, workspace).as_chunks().0.to_vec();
+            actor::<E>().forward(&self.actor.parameters, after, workspace).as_chunks().0.to_vec();
         let first: Vec<[f32; VALUES]> =
-            net::forward(&Shape::critic(), &self.targets[0], after, workspace).as_chunks().0.to_vec();
-        let second =
-            net::forward(&Shape::critic(), &self.targets[1], after, workspace).as_chunks::<VALUES>().0;
+            critic::<E>().forward(&self.targets[0], after, workspace).as_chunks().0.to_vec();
+        let second = critic::<E>().forward(&self.targets[1], after, workspace).as_chunks::<VALUES>().0;
         samples
             .iter()
             .enumerate()
             .map(|(index, (transition, _))| {
-                let [data, energy] = transition.reward;
-                let potential = |seen: &Observation| -settings.shaping * seen.way_to_terminal();
-                // On the terminal the way is zero, so the end of a mission needs no case of its own.
-                let shaped =
-                    energy + settings.discount * potential(&transition.after) - potential(&transition.before);
-                let mut target = [data, shaped].map(|reward| reward * settings.reward_scale);
+                let mut target = seen_reward::<E>(settings, transition);
                 if !transition.over {
                     let policy = Distribution::new(&logits[index], transition.mask_after);
                     for (objective, target) in target.iter_mut().enumerate() {
@@ -177,19 +172,18 @@ impl Learner {
     /// Returns the loss and, for each sample and action, the scalarised lower value before the step.
     fn update_critics(
         &mut self,
-        samples: &[(&Transition, Preference)],
-        targets: &[[f32; 2]],
+        samples: &[Sample<'_, E>],
+        targets: &[[f32; OBJECTIVES]],
         rates: Rates,
     ) -> (f32, Vec<[f32; ACTIONS]>) {
         let scale = 1.0 / samples.len() as f32;
         let mut loss = 0.0;
         let mut lower: Vec<[f32; VALUES]> = vec![[f32::INFINITY; VALUES]; samples.len()];
-        for critic in &mut self.critics {
-            critic.zero_gradients();
+        for trained in &mut self.critics {
+            trained.zero_gradients();
             let Scratch { before, workspace, .. } = &mut self.scratch;
-            net::forward_backward(
-                &Shape::critic(),
-                &critic.parameters,
+            let values = critic::<E>().forward_backward(
+                &trained.parameters,
                 before,
                 workspace,
                 |range, outputs, gradients| {
@@ -203,32 +197,24 @@ impl Learner {
                         }
                     }
                 },
-                &mut critic.gradients,
+                &mut trained.gradients,
             );
-            for (lower, values) in lower.iter_mut().zip(workspace.outputs().as_chunks::<VALUES>().0) {
+            for (lower, values) in lower.iter_mut().zip(values.as_chunks::<VALUES>().0) {
                 for (lower, value) in lower.iter_mut().zip(values) {
                     *lower = lower.min(*value);
                 }
             }
-            critic.descend(rates.learning_rate);
+            trained.descend(rates.learning_rate);
         }
-        let scalarised = lower
-            .iter()
-            .zip(samples)
-            .map(|(values, (_, preference))| {
-                std::array::from_fn(|action| {
-                    preference.w_data() * values[action * OBJECTIVES]
-                        + preference.w_energy() * values[action * OBJECTIVES + 1]
-                })
-            })
-            .collect();
-        (loss, scalarised)
+        let scalarised =
+            lower.iter().zip(samples).map(|(values, (_, preference))| scalarise(values, *preference));
+        (loss, scalarised.collect())
     }
 
     /// J_pi = E [sum_a pi (nu log pi - w . Q)] (paper, eq. 18); then nu towards the target entropy (eq. 19).
     fn update_actor(
         &mut self,
-        samples: &[(&Transition, Preference)],
+        samples: &[Sample<'_, E>],
         values: &[[f32; ACTIONS]],
         rates: Rates,
     ) -> (f32, f32) {
@@ -237,8 +223,7 @@ impl Learner {
         let (mut loss, mut entropy, mut excess) = (0.0, 0.0, 0.0);
         self.actor.zero_gradients();
         let Scratch { before, workspace, .. } = &mut self.scratch;
-        net::forward_backward(
-            &Shape::actor(),
+        actor::<E>().forward_backward(
             &self.actor.parameters,
             before,
             workspace,
@@ -299,6 +284,19 @@ impl Distribution {
         distribution
     }
 
+    /// The best of the allowed actions, but a random one of them in a share `epsilon` of all cases.
+    #[must_use]
+    pub fn epsilon_greedy(epsilon: f32, scores: &[f32; ACTIONS], mask: ActionMask) -> Distribution {
+        let mut distribution = Distribution::new(&[0.0; ACTIONS], mask);
+        let Some(best) = mask.argmax(scores) else { return distribution };
+        for (action, probability) in distribution.probability.iter_mut().enumerate() {
+            *probability *= epsilon;
+            *probability += if action == best.index() { 1.0 - epsilon } else { 0.0 };
+        }
+        distribution.log_probability = distribution.probability.map(|p| if p > 0.0 { p.ln() } else { 0.0 });
+        distribution
+    }
+
     /// sum_a pi(a) f(a).
     pub fn expectation(&self, value: impl Fn(usize) -> f32) -> f32 {
         (0..ACTIONS)
@@ -339,6 +337,16 @@ mod tests {
         assert_eq!(policy.pick(0.2), Action::Hover);
         assert_eq!(policy.pick(0.7), Action::East);
         assert_eq!(policy.pick(1.0), Action::East);
+    }
+
+    #[test]
+    fn epsilon_greedy_takes_allowed_actions_only() {
+        let mask = ActionMask::EMPTY.with(Action::Hover).with(Action::East);
+        let policy = Distribution::epsilon_greedy(0.5, &[1.0, 50.0, 50.0, 50.0, 2.0], mask);
+        assert_eq!(policy.probability, [0.25, 0.0, 0.0, 0.0, 0.75]);
+        let sure = Distribution::epsilon_greedy(0.0, &[1.0, 50.0, 50.0, 50.0, 2.0], mask);
+        assert_eq!(sure.probability, [0.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(sure.log_probability, [0.0; ACTIONS]);
     }
 
     #[test]

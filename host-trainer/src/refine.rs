@@ -11,10 +11,12 @@ use crate::flight::{Flight, Reward};
 use crate::mosac::Distribution;
 use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
 use crate::settings::Settings;
+use crate::system::System;
 use crate::train::{Learned, Tables, TrainError, Validation};
 use crate::variety::{Setting, Variety};
+use gleaner_policy::Preference;
 use gleaner_units::{Action, ActionMask};
-use gleaner_world::World;
+use gleaner_world::{Realization, ScenarioKind, World};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -26,6 +28,9 @@ pub const CHECKPOINT: &str = "refine.checkpoint";
 /// Missions in the air at once, and slots that each flies between two updates.
 const FLIGHTS: usize = 128;
 const SLOTS: usize = 32;
+/// So many of them are always out and back for energy alone. That mission lasts two slots, so among drawn ones it
+/// would hardly be seen, and it must be flown exactly.
+const SHORTEST: usize = 3;
 /// Passes over what was flown, and samples of one gradient step.
 const PASSES: usize = 2;
 const MINIBATCH: usize = 512;
@@ -41,8 +46,10 @@ const VALUE_SCALE: Reward = [40.0, 40.0];
 const CRITIC_RATE: f32 = 3.0;
 /// Updates in which only the critic learns.
 const CRITIC_FIRST: u64 = 25;
-/// The pupil's logits are multiplied by this, so that it flies what it holds for best.
-const CONFIDENCE: f32 = 2.5;
+/// Preferences are told apart in so many steps where advantages are made comparable, and a spread that is smaller
+/// than this (percent, battery units) is not blown up.
+const PREFERENCE_BINS: usize = 11;
+const SPREAD_MIN: f32 = 0.3;
 /// Share of the actor that its running average takes over per update.
 const AVERAGING: f32 = 0.03;
 
@@ -109,11 +116,17 @@ const fn critic_shape() -> Shape {
 }
 
 impl Refinement {
-    /// Goes on from the checkpoint in `folder`, or begins with the actor of `from`.
+    /// Goes on from the checkpoint in `folder`, or begins with the actor of `from`, its logits multiplied by
+    /// `confidence`: a pupil that holds many actions for good flies better by the one it holds for best.
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
-    pub fn open(settings: Settings, folder: &Path, from: &Learned) -> Result<Refinement, TrainError> {
+    pub fn open(
+        settings: Settings,
+        folder: &Path,
+        from: &Learned,
+        confidence: f32,
+    ) -> Result<Refinement, TrainError> {
         let path = folder.join(CHECKPOINT);
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let kept = if path.exists() {
@@ -127,7 +140,7 @@ impl Refinement {
             kept
         } else {
             let critic = critic_shape().initialise(&mut rng);
-            let actor = confident(&from.actor);
+            let actor = confident(&from.actor, confidence);
             Kept {
                 averaged: actor.clone(),
                 adams: [Adam::new(actor.len(), 0.0), Adam::new(critic.len(), 0.0)],
@@ -145,7 +158,7 @@ impl Refinement {
         let before = from.settings.command_line(&from.method, "FIRST");
         let mut run = Refinement {
             method: format!(
-                "{} && gleaner-train refine --from FIRST",
+                "{} && gleaner-train refine --from FIRST --confidence {confidence}",
                 before.trim_start_matches("gleaner-train ")
             ),
             variety: Variety::new(&world, &settings),
@@ -158,32 +171,37 @@ impl Refinement {
             batch: Batch::new(),
             workspace: Workspace::new(),
         };
-        for (mission, actions) in std::mem::take(&mut run.kept.flights) {
-            let mut going = run.begin(mission)?;
+        for (index, (mission, actions)) in std::mem::take(&mut run.kept.flights).into_iter().enumerate() {
+            let mut going = run.begin(index, mission)?;
             for action in actions {
                 going.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
             }
             run.flights.push(going);
         }
-        while run.flights.len() < FLIGHTS {
-            let going = run.next_flight()?;
+        for index in run.flights.len()..FLIGHTS {
+            let going = run.next_flight(index)?;
             run.flights.push(going);
         }
         Ok(run)
     }
 
-    fn begin(&self, mission: u64) -> Result<Going, TrainError> {
+    fn begin(&self, index: usize, mission: u64) -> Result<Going, TrainError> {
         let Setting { world, reports_missing } = self.variety.setting(mission);
-        let drawn = self.settings.mission(world, mission)?;
+        let mut drawn = self.settings.mission(world, mission)?;
+        if index < SHORTEST && self.settings.share_rb > 0.0 {
+            let scenario = ScenarioKind::ReturnBase.scenario().in_city(world.city());
+            drawn.realization = Realization::draw(world.city(), &scenario, drawn.seed)?;
+            drawn.preference = Preference::ENERGY;
+        }
         let flight = Flight::new(world, &drawn.realization, drawn.seed, drawn.preference)?
             .with_reports_missing(reports_missing, drawn.seed);
         Ok(Going { mission, actions: Vec::new(), flight })
     }
 
-    fn next_flight(&mut self) -> Result<Going, TrainError> {
+    fn next_flight(&mut self, index: usize) -> Result<Going, TrainError> {
         let mission = self.kept.next_mission;
         self.kept.next_mission += 1;
-        self.begin(mission)
+        self.begin(index, mission)
     }
 
     /// Updates done.
@@ -213,11 +231,7 @@ impl Refinement {
         for (experiences, ahead) in flown.into_iter().zip(ahead) {
             lessons.extend(judge(experiences, ahead));
         }
-        let spread = (lessons.iter().map(|lesson| lesson.advantage * lesson.advantage).sum::<f32>()
-            / lessons.len() as f32)
-            .sqrt()
-            .max(1e-3);
-        lessons.iter_mut().for_each(|lesson| lesson.advantage /= spread);
+        even_out(&mut lessons);
         let findings = self.learn(&lessons);
         self.kept.update += 1;
         let share = AVERAGING.max(1.0 / self.kept.update as f32);
@@ -242,7 +256,7 @@ impl Refinement {
             flown[index].push(Experience { sample, mask, action, log_probability, reward, value, over });
             self.kept.steps += 1;
             if over {
-                self.flights[index] = self.next_flight()?;
+                self.flights[index] = self.next_flight(index)?;
             }
         }
         Ok(())
@@ -346,6 +360,7 @@ impl Refinement {
         let score = tables.score();
         if best.as_ref().is_none_or(|best| score > best.score) {
             *best = Some(Learned {
+                system: System::MosacAtt,
                 method: self.method.clone(),
                 settings: self.settings.clone(),
                 actor: self.kept.averaged.clone(),
@@ -413,6 +428,22 @@ fn judge(experiences: Vec<Experience>, ahead: Reward) -> Vec<Lesson> {
     lessons
 }
 
+/// Divides the advantages by their spread among lessons of about the same preference: the noise of the data would
+/// drown what half a battery unit means to those who fly for energy.
+fn even_out(lessons: &mut [Lesson]) {
+    let mut sums = [(0.0, 0.0); PREFERENCE_BINS];
+    let bin = |lesson: &Lesson| (lesson.sample.preference[0] * (PREFERENCE_BINS - 1) as f32).round() as usize;
+    for lesson in lessons.iter() {
+        let (squares, count) = &mut sums[bin(lesson)];
+        *squares += lesson.advantage * lesson.advantage;
+        *count += 1.0_f32;
+    }
+    for lesson in lessons {
+        let (squares, count) = sums[bin(lesson)];
+        lesson.advantage /= (squares / count).sqrt().max(SPREAD_MIN);
+    }
+}
+
 impl Lesson {
     /// The gradient of the clipped objective and the entropy for the logits; gives entropy and divergence.
     fn gradient(&self, logits: &[f32; Action::COUNT], gradient: &mut [f32; Action::COUNT]) -> (f32, f32) {
@@ -432,10 +463,10 @@ impl Lesson {
 }
 
 /// The same decisions, made with more confidence.
-fn confident(actor: &[f32]) -> Vec<f32> {
+fn confident(actor: &[f32], confidence: f32) -> Vec<f32> {
     let mut actor = actor.to_vec();
     for tensor in Shape::actor().tensors().iter().filter(|tensor| tensor.name.starts_with("head.1.")) {
-        actor[tensor.offset..tensor.offset + tensor.len()].iter_mut().for_each(|x| *x *= CONFIDENCE);
+        actor[tensor.offset..tensor.offset + tensor.len()].iter_mut().for_each(|x| *x *= confidence);
     }
     actor
 }

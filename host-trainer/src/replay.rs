@@ -1,17 +1,16 @@
 //! What was experienced: a ring of transitions without preferences, to be relabelled with any.
 
 use crate::flight::Reward;
-use crate::observation::Observation;
 use gleaner_units::{Action, ActionMask};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// One slot of one flight.
+/// One slot of one flight; `O` is what an encoding keeps of a state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Transition {
+pub struct Transition<O> {
     /// The state.
-    pub before: Observation,
+    pub before: O,
     /// What the guard allowed there.
     pub mask_before: ActionMask,
     /// What was done.
@@ -19,7 +18,7 @@ pub struct Transition {
     /// Percent of data, minus battery units.
     pub reward: Reward,
     /// The next state.
-    pub after: Observation,
+    pub after: O,
     /// What the guard allows there.
     pub mask_after: ActionMask,
     /// Whether the mission ended: `after` has no future.
@@ -28,21 +27,21 @@ pub struct Transition {
 
 /// The last `capacity` transitions.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Replay {
+pub struct Replay<O> {
     capacity: usize,
     next: usize,
-    ring: Vec<Transition>,
+    ring: Vec<Transition<O>>,
 }
 
-impl Replay {
+impl<O> Replay<O> {
     /// An empty memory for up to `capacity` transitions.
     #[must_use]
-    pub const fn new(capacity: usize) -> Replay {
+    pub const fn new(capacity: usize) -> Replay<O> {
         Replay { capacity, next: 0, ring: Vec::new() }
     }
 
     /// Remembers a transition and forgets the oldest if there is no room.
-    pub fn push(&mut self, transition: Transition) {
+    pub fn push(&mut self, transition: Transition<O>) {
         if self.ring.len() < self.capacity {
             self.ring.push(transition);
         } else {
@@ -52,7 +51,7 @@ impl Replay {
     }
 
     /// `count` transitions, uniformly and with repetition.
-    pub fn sample(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<&Transition> {
+    pub fn sample(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<&Transition<O>> {
         (0..count).map(|_| &self.ring[rng.random_range(0..self.ring.len())]).collect()
     }
 

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// Hyper-parameters and the distribution of missions. The defaults are the paper's where it gives a number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, clap::Args)]
+#[serde(default)]
 pub struct Settings {
     /// Names every random draw of the run.
     #[arg(long, default_value_t = 1)]
@@ -93,6 +94,37 @@ pub struct Settings {
     pub share_cities: f64,
 }
 
+impl Default for Settings {
+    /// What the command line means by no words at all.
+    fn default() -> Settings {
+        use clap::{Args as _, FromArgMatches as _};
+        let nothing = Settings::augment_args(clap::Command::new("settings")).get_matches_from(["settings"]);
+        Settings::from_arg_matches(&nothing).expect("every setting has a default")
+    }
+}
+
+/// Settings inside a binary file, as JSON: a file that was written before a setting existed can still be read.
+pub mod as_json {
+    use super::Settings;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
+
+    /// As a string.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, S::Error> {
+        serde_json::to_string(settings).map_err(ser::Error::custom)?.serialize(serializer)
+    }
+
+    /// From a string; what it does not name has its default.
+    ///
+    /// # Errors
+    /// Not JSON, or a setting of another type.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Settings, D::Error> {
+        serde_json::from_str(&String::deserialize(deserializer)?).map_err(de::Error::custom)
+    }
+}
+
 impl Settings {
     /// The mission with this number: every draw comes from the run's seed and the number.
     ///
@@ -165,6 +197,18 @@ impl Settings {
         command
     }
 
+    /// Target entropy at this update, as a share of the largest possible.
+    #[must_use]
+    pub fn entropy_target_at(&self, update: u64) -> f32 {
+        mix(self.entropy_start, self.entropy_end, self.annealed(update))
+    }
+
+    /// Temperature of the exploring softmax at this update.
+    #[must_use]
+    pub fn heat_at(&self, update: u64) -> f32 {
+        mix(self.heat_start, self.heat_end, self.annealed(update))
+    }
+
     /// How far along the annealing is, 0 to 1.
     #[must_use]
     pub fn annealed(&self, update: u64) -> f32 {
@@ -178,6 +222,11 @@ impl Settings {
         let falling = ((progress - 0.5) * 2.0).clamp(0.0, 1.0) as f32;
         self.learning_rate + (self.learning_rate_end - self.learning_rate) * falling
     }
+}
+
+/// The line from start to end.
+pub(crate) fn mix(start: f32, end: f32, progress: f32) -> f32 {
+    start + (end - start) * progress
 }
 
 /// Uniform over the preferences.

@@ -1,15 +1,19 @@
 //! The training loop, read top to bottom.
 
 use crate::checkpoint::{self, CheckpointError};
-use crate::evaluation::{DeciderError, Network, Table, evaluate};
+use crate::encoding::Encoding;
+use crate::evaluation::DeciderError;
 use crate::flight::{Flight, Reward};
 use crate::greedy::Greedy;
-use crate::mosac::{Distribution, Learner, Losses, Rates};
-use crate::net::{self, Shape};
+use crate::learned::Trained;
+use crate::learner::{ACTIONS, Asked, Learner};
+use crate::mosac::Distribution;
+use crate::net;
 use crate::replay::{Replay, Transition};
 use crate::settings::{Settings, random_preference};
+use crate::system::System;
 use gleaner_units::Action;
-use gleaner_world::{Realization, ScenarioError, ScenarioKind, Seed, World};
+use gleaner_world::{ScenarioError, World};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -17,17 +21,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
 
+pub use crate::learned::{LEARNED, Learned};
+pub use crate::validation::{Tables, Validation};
+
 /// The checkpoint's name inside the output folder.
 pub const CHECKPOINT: &str = "run.checkpoint";
-/// The best parameters' name inside the output folder.
-pub const LEARNED: &str = "learned.checkpoint";
 /// The learning curve's name inside the output folder: one JSON object a line.
 pub const CURVE: &str = "curve.jsonl";
-/// Realizations that choose the best parameters have numbers from here on; those that judge count from 0.
-const VALIDATION_FROM: u64 = 10_000;
-const VALIDATION_COUNT: u64 = 60;
-/// Share of the actor that its running average takes over per update. The average is what is judged and shipped:
-/// single updates are noisy, and the noise does not fly. It does not act back on the training.
+/// Share of the deciding network that its running average takes over per update. The average is what is judged and
+/// shipped: single updates are noisy, and the noise does not fly. It does not act back on the training.
 const AVERAGING: f32 = 0.001;
 
 /// Why a run cannot start or go on.
@@ -51,6 +53,14 @@ pub enum TrainError {
         /// The checkpoint.
         path: PathBuf,
     },
+    /// The folder belongs to a run of another system.
+    #[error("{}: holds a run of {found}; train into another --out folder, or give --system {found}", path.display())]
+    OtherSystem {
+        /// The checkpoint.
+        path: PathBuf,
+        /// Whose run it is.
+        found: System,
+    },
 }
 
 /// What a run tells while it goes on: one line of the learning curve.
@@ -66,105 +76,23 @@ pub struct Progress<L> {
     pub tables: Tables,
 }
 
-/// Per scenario that is trained: name and validation table.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct Tables(pub Vec<(String, Table)>);
-
-impl Tables {
-    /// What the best parameters are chosen by: the mean hypervolume over the scenarios.
-    #[must_use]
-    pub fn score(&self) -> f64 {
-        self.0.iter().map(|(_, table)| table.hypervolume).sum::<f64>() / self.0.len().max(1) as f64
-    }
-}
-
-/// The realizations that choose the best parameters: other ones than those that are trained on and those that judge.
-#[derive(Clone, Debug)]
-pub struct Validation(Vec<(ScenarioKind, Vec<(Seed, Realization)>)>);
-
-impl Validation {
-    /// Those of the scenarios that the settings train.
-    ///
-    /// # Errors
-    /// The scenario does not fit the city.
-    pub fn draw(world: &World, settings: &Settings) -> Result<Validation, ScenarioError> {
-        let shares = [settings.share_rd, settings.share_rb];
-        let trained = ScenarioKind::ALL.into_iter().zip(shares).filter(|(_, share)| *share > 0.0);
-        trained
-            .map(|(kind, _)| {
-                let numbers = VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT;
-                let drawn = numbers.map(|number| {
-                    let seed = Seed::evaluation(number);
-                    Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))
-                });
-                Ok((kind, drawn.collect::<Result<_, ScenarioError>>()?))
-            })
-            .collect::<Result<_, _>>()
-            .map(Validation)
-    }
-
-    /// The paper's metrics of an actor on them.
-    ///
-    /// # Errors
-    /// The network's answer is not a number: the run diverged.
-    pub fn judge(&self, world: &Arc<World>, actor: &[f32]) -> Result<Tables, DeciderError> {
-        let table = |(kind, realizations): &(ScenarioKind, Vec<(Seed, Realization)>)| {
-            let mut network = Network::new(Shape::actor(), actor);
-            Ok((kind.name().to_owned(), evaluate(world, realizations, &mut network)?))
-        };
-        self.0.iter().map(table).collect::<Result<_, _>>().map(Tables)
-    }
-}
-
-/// The best parameters of a run by validation, and how they came about: what `evaluate` and `export` read.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Learned {
-    /// The command that made them: `train` or `distil`.
-    pub method: String,
-    /// Its settings.
-    pub settings: Settings,
-    /// The actor.
-    pub actor: Vec<f32>,
-    /// Update at which it was found.
-    pub update: u64,
-    /// Slots flown until then.
-    pub steps: u64,
-    /// Mean hypervolume on the validation realizations.
-    pub score: f64,
-}
-
-impl Learned {
-    /// Reads what a run in `folder` has learned so far; `None` before its first validation.
-    ///
-    /// # Errors
-    /// The file is damaged.
-    pub fn load(folder: &Path) -> Result<Option<Learned>, CheckpointError> {
-        let path = folder.join(LEARNED);
-        if path.exists() { checkpoint::load(&path).map(Some) } else { Ok(None) }
-    }
-
-    /// Writes it.
-    ///
-    /// # Errors
-    /// The disk; the last good file is then still there.
-    pub fn save(&self, folder: &Path) -> Result<(), CheckpointError> {
-        checkpoint::save(&folder.join(LEARNED), self)
-    }
-}
+/// The remembered transitions of a learner.
+type Memory<L> = Replay<<<L as Learner>::Encoding as Encoding>::Observation>;
 
 /// A run: everything that the next update depends on.
-pub struct Run {
+pub struct Run<L: Learner> {
     settings: Settings,
     world: Arc<World>,
-    learner: Learner,
-    replay: Replay,
+    encoding: L::Encoding,
+    learner: L,
+    replay: Memory<L>,
+    asked: Asked<L::Encoding>,
     flights: Vec<Going>,
     next_mission: u64,
     rng: ChaCha8Rng,
     update: u64,
     steps: u64,
-    averaged_actor: Vec<f32>,
+    averaged: Vec<f32>,
     validation: Validation,
 }
 
@@ -188,31 +116,37 @@ impl Going {
     }
 }
 
+/// What the checkpoint keeps; `S`, `L` and `R` are settings, learner and replay, or references to them.
 #[derive(Serialize, Deserialize)]
-struct Stored {
-    settings: Settings,
-    learner: Learner,
-    replay: Replay,
+struct Stored<S, L, R> {
+    settings: S,
+    learner: L,
+    replay: R,
     flights: Vec<(u64, Vec<u8>)>,
     next_mission: u64,
     rng_seed: [u8; 32],
     rng_word: u128,
     update: u64,
     steps: u64,
-    averaged_actor: Vec<f32>,
+    averaged: Vec<f32>,
 }
 
-impl Run {
+impl<L: Learner> Run<L> {
     /// Goes on from the checkpoint in `folder`, or starts a new run when there is none.
     ///
     /// # Errors
     /// See [`TrainError`].
-    pub fn open(settings: Settings, folder: &Path) -> Result<Run, TrainError> {
+    pub fn open(settings: Settings, folder: &Path) -> Result<Run<L>, TrainError> {
         let path = folder.join(CHECKPOINT);
         if !path.exists() {
             return Run::new(settings);
         }
-        let stored: Stored = checkpoint::load(&path)?;
+        let named = checkpoint::load_named(&path)?;
+        let found = named.name().parse().map_err(|_| CheckpointError::Format { path: path.clone() })?;
+        if found != L::SYSTEM {
+            return Err(TrainError::OtherSystem { path, found });
+        }
+        let stored: Stored<Settings, L, Memory<L>> = named.value()?;
         // A finished run may be prolonged.
         if (Settings { updates: settings.updates, ..stored.settings.clone() }) != settings {
             return Err(TrainError::OtherSettings { path });
@@ -220,9 +154,9 @@ impl Run {
         Run::restore(settings, stored)
     }
 
-    fn new(settings: Settings) -> Result<Run, TrainError> {
+    fn new(settings: Settings) -> Result<Run<L>, TrainError> {
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-        let learner = Learner::new(&settings, &mut rng);
+        let learner = L::new(&settings, &mut rng);
         let mut run = Run::assemble(settings, learner, rng)?;
         for _ in 0..run.settings.steps_per_update {
             let going = run.next_flight()?;
@@ -231,7 +165,7 @@ impl Run {
         Ok(run)
     }
 
-    fn restore(settings: Settings, stored: Stored) -> Result<Run, TrainError> {
+    fn restore(settings: Settings, stored: Stored<Settings, L, Memory<L>>) -> Result<Run<L>, TrainError> {
         let mut rng = ChaCha8Rng::from_seed(stored.rng_seed);
         rng.set_word_pos(stored.rng_word);
         let mut run = Run::assemble(settings, stored.learner, rng)?;
@@ -239,7 +173,7 @@ impl Run {
         run.next_mission = stored.next_mission;
         run.update = stored.update;
         run.steps = stored.steps;
-        run.averaged_actor = stored.averaged_actor;
+        run.averaged = stored.averaged;
         for (mission, actions) in stored.flights {
             let mut going = run.begin(mission)?;
             for action in actions {
@@ -251,15 +185,17 @@ impl Run {
         Ok(run)
     }
 
-    fn assemble(settings: Settings, learner: Learner, rng: ChaCha8Rng) -> Result<Run, TrainError> {
+    fn assemble(settings: Settings, learner: L, rng: ChaCha8Rng) -> Result<Run<L>, TrainError> {
         let world = Arc::new(World::default_world());
         let validation = Validation::draw(&world, &settings)?;
         Ok(Run {
             replay: Replay::new(settings.replay),
             settings,
+            encoding: L::Encoding::of(&world),
             world,
-            averaged_actor: learner.actor().to_vec(),
+            averaged: learner.deciding().to_vec(),
             learner,
+            asked: Asked::new(L::network()),
             flights: Vec::new(),
             next_mission: 0,
             rng,
@@ -297,7 +233,7 @@ impl Run {
     ///
     /// # Errors
     /// No mission could be drawn.
-    pub fn advance(&mut self) -> Result<Losses, TrainError> {
+    pub fn advance(&mut self) -> Result<L::Losses, TrainError> {
         while self.replay.len() < self.settings.warm_up.min(self.settings.replay) {
             self.fly(true)?;
         }
@@ -313,36 +249,34 @@ impl Run {
                 }
             })
             .collect();
-        let annealed = self.settings.annealed(self.update);
-        let rates = Rates {
-            learning_rate: self.settings.learning_rate_at(self.update),
-            entropy_target: mix(self.settings.entropy_start, self.settings.entropy_end, annealed),
-        };
-        let losses = self.learner.update(&self.settings, rates, &transitions, &preferences);
+        let losses =
+            self.learner.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
         self.update += 1;
         // A plain mean at first, so that the untrained start is soon forgotten.
         let share = AVERAGING.max(1.0 / self.update as f32);
-        net::polyak(&mut self.averaged_actor, self.learner.actor(), share);
+        net::polyak(&mut self.averaged, self.learner.deciding(), share);
         Ok(losses)
     }
 
-    /// One slot of every flight, explored with the heated softmax (paper, eq. 20).
+    /// One slot of every flight, explored as the learner does.
     fn fly(&mut self, uniform: bool) -> Result<(), TrainError> {
-        let heat = mix(self.settings.heat_start, self.settings.heat_end, self.settings.annealed(self.update));
-        let observations: Vec<_> = self.flights.iter().map(|going| going.flight.observe()).collect();
-        let logits = Network::new(Shape::actor(), self.learner.actor()).logits(
-            self.flights.iter().zip(&observations).map(|(going, seen)| seen.with(going.flight.preference())),
-        );
-        for (index, (before, logits)) in observations.into_iter().zip(logits).enumerate() {
+        let observations: Vec<_> =
+            self.flights.iter().map(|going| self.encoding.observe(&going.flight)).collect();
+        let scores = self.scores(&observations);
+        for (index, (before, scores)) in observations.into_iter().zip(scores).enumerate() {
             let going = &mut self.flights[index];
             let mask_before = going.flight.mask();
-            let heated = if uniform { [0.0; Action::COUNT] } else { logits.map(|logit| logit / heat) };
-            let explored = Distribution::new(&heated, mask_before).pick(self.rng.random());
+            let policy = if uniform {
+                Distribution::new(&[0.0; ACTIONS], mask_before)
+            } else {
+                L::explore(&self.settings, self.update, &scores, mask_before)
+            };
+            let explored = policy.pick(self.rng.random());
             let guided = !uniform && self.rng.random_bool(0.9);
             let action = going.advice().filter(|_| guided).unwrap_or(explored);
             let reward = going.step(action);
             let over = going.flight.is_over();
-            let (after, mask_after) = (going.flight.observe(), going.flight.mask());
+            let (after, mask_after) = (self.encoding.observe(&going.flight), going.flight.mask());
             self.replay.push(Transition { before, mask_before, action, reward, after, mask_after, over });
             self.steps += 1;
             if over {
@@ -352,22 +286,32 @@ impl Run {
         Ok(())
     }
 
-    /// Judges the averaged actor on the validation realizations, and puts it into `best` if it is better.
+    /// What the deciding network says of each action in each flight.
+    fn scores(&mut self, observations: &[<L::Encoding as Encoding>::Observation]) -> Vec<[f32; ACTIONS]> {
+        let preferences = self.flights.iter().map(|going| going.flight.preference());
+        let states = observations.iter().zip(preferences.clone());
+        let answers = self.asked.answer(&self.encoding, self.learner.deciding(), states);
+        let answers = answers.chunks_exact(answers.len() / observations.len());
+        answers.zip(preferences).map(|(answer, preference)| L::scores(answer, preference)).collect()
+    }
+
+    /// Judges the averaged network on the validation realizations, and puts it into `best` if it is better.
     ///
     /// # Errors
     /// The network's answer is not a number: the run diverged.
     pub fn validate(
         &self,
-        losses: Losses,
+        losses: L::Losses,
         best: &mut Option<Learned>,
-    ) -> Result<Progress<Losses>, TrainError> {
-        let tables = self.validation.judge(&self.world, &self.averaged_actor)?;
+    ) -> Result<Progress<L::Losses>, TrainError> {
+        let tables = self.validation.tables(&self.world, &mut Trained::<L>::new(&self.averaged))?;
         let score = tables.score();
         if best.as_ref().is_none_or(|best| score > best.score) {
             *best = Some(Learned {
-                method: "train".into(),
+                system: L::SYSTEM,
+                method: method(L::SYSTEM),
                 settings: self.settings.clone(),
-                actor: self.averaged_actor.clone(),
+                actor: self.averaged.clone(),
                 update: self.update,
                 steps: self.steps,
                 score,
@@ -382,21 +326,22 @@ impl Run {
     /// The disk; the last good checkpoint is then still there.
     pub fn save(&self, folder: &Path) -> Result<(), TrainError> {
         let stored = Stored {
-            settings: self.settings.clone(),
-            learner: self.learner.clone(),
-            replay: self.replay.clone(),
+            settings: &self.settings,
+            learner: &self.learner,
+            replay: &self.replay,
             flights: self.flights.iter().map(|going| (going.mission, going.actions.clone())).collect(),
             next_mission: self.next_mission,
             rng_seed: self.rng.get_seed(),
             rng_word: self.rng.get_word_pos(),
             update: self.update,
             steps: self.steps,
-            averaged_actor: self.averaged_actor.clone(),
+            averaged: self.averaged.clone(),
         };
-        Ok(checkpoint::save(&folder.join(CHECKPOINT), &stored)?)
+        Ok(checkpoint::save_named(&folder.join(CHECKPOINT), L::SYSTEM.name(), &stored)?)
     }
 }
 
-fn mix(start: f32, end: f32, progress: f32) -> f32 {
-    start + (end - start) * progress
+/// The command that trains a system, without its settings.
+fn method(system: System) -> String {
+    if system == System::default() { "train".into() } else { format!("train --system {system}") }
 }

@@ -1,6 +1,7 @@
 //! A killed run goes on exactly where its last checkpoint was.
 
 use clap::Parser;
+use gleaner_host_trainer::learner::MosacAtt;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::train::{CHECKPOINT, Run, TrainError};
 use std::fs;
@@ -20,13 +21,13 @@ fn settings(more: &[&str]) -> Settings {
 #[test]
 fn resuming_gives_the_same_bits_as_never_having_stopped() {
     let (through, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let mut run = Run::open(settings(&[]), through.path()).unwrap();
+    let mut run = Run::<MosacAtt>::open(settings(&[]), through.path()).unwrap();
     while !run.is_done() {
         run.advance().unwrap();
     }
     run.save(through.path()).unwrap();
 
-    let mut run = Run::open(settings(&[]), stopped.path()).unwrap();
+    let mut run = Run::<MosacAtt>::open(settings(&[]), stopped.path()).unwrap();
     for _ in 0..23 {
         run.advance().unwrap();
     }
@@ -35,7 +36,7 @@ fn resuming_gives_the_same_bits_as_never_having_stopped() {
         run.advance().unwrap(); // lost in the kill
     }
     drop(run);
-    let mut run = Run::open(settings(&[]), stopped.path()).unwrap();
+    let mut run = Run::<MosacAtt>::open(settings(&[]), stopped.path()).unwrap();
     assert_eq!(run.update(), 23);
     while !run.is_done() {
         run.advance().unwrap();
@@ -49,23 +50,23 @@ fn resuming_gives_the_same_bits_as_never_having_stopped() {
 #[test]
 fn a_folder_with_another_run_is_refused_and_a_longer_run_is_not() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Run::open(settings(&[]), folder.path()).unwrap();
+    let run = Run::<MosacAtt>::open(settings(&[]), folder.path()).unwrap();
     run.save(folder.path()).unwrap();
-    let error = Run::open(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
+    let error = Run::<MosacAtt>::open(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
     assert!(matches!(error, TrainError::OtherSettings { .. }), "{error}");
     let mut longer = settings(&[]);
     longer.updates = 90;
-    assert!(Run::open(longer, folder.path()).is_ok());
+    assert!(Run::<MosacAtt>::open(longer, folder.path()).is_ok());
 }
 
 #[test]
 fn a_damaged_checkpoint_is_refused_and_kept() {
     let folder = tempfile::tempdir().unwrap();
-    Run::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
+    Run::<MosacAtt>::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
     let path = folder.path().join(CHECKPOINT);
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
-    let error = Run::open(settings(&[]), folder.path()).err().unwrap().to_string();
+    let error = Run::<MosacAtt>::open(settings(&[]), folder.path()).err().unwrap().to_string();
     assert!(error.contains("damaged"), "{error}");
     assert_eq!(fs::read(&path).unwrap().len(), whole.len() / 2, "the evidence is untouched");
 }

@@ -1,8 +1,7 @@
 //! `gleaner-train evaluate`.
 
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
-use gleaner_host_trainer::net::Shape;
+use gleaner_host_trainer::evaluation::{Engine, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{ScenarioKind, World};
@@ -48,8 +47,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut systems = vec![("GREEDY".to_owned(), evaluate_greedy(&world, &drawn))];
     if let Some(folder) = &arguments.run {
         let learned = learned(folder)?;
-        let mut network = Network::new(Shape::actor(), &learned.actor);
-        systems.push((format!("{}", folder.display()), evaluate(&world, &drawn, &mut network)?));
+        let mut decider = learned.decider();
+        systems.push((format!("{}", folder.display()), evaluate(&world, &drawn, &mut *decider)?));
     }
     if let Some(path) = &arguments.model {
         let mut policy = super::export::load_model(path)?;

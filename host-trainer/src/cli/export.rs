@@ -1,12 +1,14 @@
 //! `gleaner-train export`.
 
-use super::evaluate::{learned, render};
+use super::evaluate::render;
+use super::learned_of;
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::Learned;
 use gleaner_policy::Tokens;
 use gleaner_policy::onnx::TractPolicy;
@@ -44,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
         bail!("--realizations 0: a card without measurements is no card; give at least 1");
     }
-    let learned = learned(&arguments.run)?;
+    let learned = learned_of(System::MosacAtt, &arguments.run)?;
     let world = Arc::new(World::default_world());
     let commit = match &arguments.commit {
         Some(commit) => commit.clone(),

@@ -5,8 +5,11 @@ mod export;
 mod oracle;
 mod train;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
+use gleaner_host_trainer::learned::Learned;
+use gleaner_host_trainer::system::System;
+use std::path::Path;
 
 /// Learns, evaluates and exports policies for Gleaner.
 #[derive(Debug, Parser)]
@@ -19,7 +22,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Train a policy; goes on from the last checkpoint in --out if there is one.
-    Train(train::Arguments),
+    Train(train::TrainArguments),
     /// Teach a policy what a planner with full knowledge does; resumes like train. Of the settings it uses the
     /// missions, the batch (batch x preferences lessons), the replay size and the learning rates.
     Distil(train::DistilArguments),
@@ -42,4 +45,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Oracle(arguments) => oracle::run(arguments),
         Command::Export(arguments) => export::run(arguments),
     }
+}
+
+/// The best parameters of the run in `folder`, which must be of this system.
+fn learned_of(system: System, folder: &Path) -> Result<Learned> {
+    Learned::load_of(system, folder)?.with_context(|| {
+        format!(
+            "{}: no run has been validated here yet; wait for its first line or check --run",
+            folder.display()
+        )
+    })
 }

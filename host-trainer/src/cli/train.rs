@@ -1,10 +1,12 @@
 //! `gleaner-train train` and `gleaner-train distil`.
 
-use super::evaluate::learned;
+use super::learned_of;
 use anyhow::{Context, Result};
 use gleaner_host_trainer::distil::Distillation;
+use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::refine::Refinement;
 use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::{CURVE, Learned, Run, Tables};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::{self, File, OpenOptions};
@@ -26,6 +28,16 @@ pub struct Arguments {
     settings: Settings,
 }
 
+/// What only learning by trial takes.
+#[derive(Debug, clap::Args)]
+pub struct TrainArguments {
+    /// Which of the paper's systems: mosac-att, mosac-cgl, ddqn-cgl or mosac-ftv. Only mosac-att can be exported.
+    #[arg(long, default_value = "mosac-att")]
+    system: System,
+    #[command(flatten)]
+    usual: Arguments,
+}
+
 /// What only the distillation takes.
 #[derive(Debug, clap::Args)]
 pub struct DistilArguments {
@@ -42,25 +54,37 @@ pub struct RefineArguments {
     /// Begin with what the run in this folder has learned.
     #[arg(long)]
     from: PathBuf,
+    /// Its logits are multiplied by this first: what was taught is unsure, what was refined is not (1).
+    #[arg(long, default_value_t = 2.5)]
+    confidence: f32,
     #[command(flatten)]
     usual: Arguments,
 }
 
-/// Learns by trial: MOSAC.
-pub fn run(arguments: &Arguments) -> Result<()> {
-    let mut desk = Desk::open(arguments)?;
-    let mut run = Run::open(arguments.settings.clone(), &arguments.out)?;
+/// Learns by trial: one of the paper's systems.
+pub fn run(arguments: &TrainArguments) -> Result<()> {
+    let TrainArguments { system, usual } = arguments;
+    let in_paper = system.parameter_count_in_paper().map(|count| format!(" (the paper: {count})"));
+    println!("{}: {} parameters{}", system.title(), system.parameter_count(), in_paper.unwrap_or_default());
+    match system {
+        System::MosacAtt => by_trial::<MosacAtt>(usual),
+        System::MosacCgl => by_trial::<MosacCgl>(usual),
+        System::DdqnCgl => by_trial::<DdqnCgl>(usual),
+        System::MosacFtv => by_trial::<MosacFtv>(usual),
+    }
+}
+
+fn by_trial<L: Learner>(arguments: &Arguments) -> Result<()> {
+    let mut desk = Desk::open(L::SYSTEM, arguments)?;
+    let mut run = Run::<L>::open(arguments.settings.clone(), &arguments.out)?;
     desk.begin(run.update());
     while !run.is_done() {
         let losses = run.advance()?;
         desk.bar.set_position(run.update());
         if desk.validation_is_due(run.update()) {
+            let told = losses.to_string();
             let progress = run.validate(losses, &mut desk.best)?;
-            let of_losses = format!(
-                "critic {:.4}  entropy {:.3}  nu {:.5}",
-                losses.critic, losses.entropy, losses.entropy_weight
-            );
-            desk.report(&serde_json::to_value(&progress)?, run.update(), &of_losses, &progress.tables)?;
+            desk.report(&serde_json::to_value(&progress)?, run.update(), &told, &progress.tables)?;
         }
         if desk.checkpoint_is_due(run.update()) {
             run.save(&arguments.out)?;
@@ -72,9 +96,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 /// Learns from the planner: distillation.
 pub fn distil(arguments: &DistilArguments) -> Result<()> {
-    let from = arguments.from.as_deref().map(learned).transpose()?;
+    let from = arguments.from.as_deref().map(|folder| learned_of(System::MosacAtt, folder)).transpose()?;
     let arguments = &arguments.usual;
-    let mut desk = Desk::open(arguments)?;
+    let mut desk = Desk::open(System::MosacAtt, arguments)?;
     let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref())?;
     desk.begin(run.update());
     while !run.is_done() {
@@ -97,10 +121,11 @@ pub fn distil(arguments: &DistilArguments) -> Result<()> {
 
 /// Learns from its own flights: refinement.
 pub fn refine(arguments: &RefineArguments) -> Result<()> {
-    let from = learned(&arguments.from)?;
+    let from = learned_of(System::MosacAtt, &arguments.from)?;
+    let confidence = arguments.confidence;
     let arguments = &arguments.usual;
-    let mut desk = Desk::open(arguments)?;
-    let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, &from)?;
+    let mut desk = Desk::open(System::MosacAtt, arguments)?;
+    let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, &from, confidence)?;
     desk.begin(run.update());
     while !run.is_done() {
         let findings = run.advance()?;
@@ -124,6 +149,7 @@ pub fn refine(arguments: &RefineArguments) -> Result<()> {
 
 /// What all ways of learning show and leave in the folder.
 struct Desk<'a> {
+    system: System,
     arguments: &'a Arguments,
     bar: ProgressBar,
     curve: File,
@@ -131,14 +157,14 @@ struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    fn open(arguments: &'a Arguments) -> Result<Desk<'a>> {
+    fn open(system: System, arguments: &'a Arguments) -> Result<Desk<'a>> {
         let out = &arguments.out;
         fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         let path = out.join(CURVE);
         let curve = OpenOptions::new().create(true).append(true).open(&path);
         let curve = curve.with_context(|| path.display().to_string())?;
-        let best = Learned::load(out)?;
-        Ok(Desk { arguments, bar: bar(arguments.settings.updates), curve, best })
+        let best = Learned::load_of(system, out)?;
+        Ok(Desk { system, arguments, bar: bar(arguments.settings.updates), curve, best })
     }
 
     fn begin(&self, update: u64) {
@@ -186,7 +212,11 @@ impl<'a> Desk<'a> {
     fn end(&self) {
         self.bar.abandon();
         let out = self.arguments.out.display();
-        println!("done; next: gleaner-train export --run {out} --model models/mine.onnx");
+        if self.system == System::MosacAtt {
+            println!("done; next: gleaner-train export --run {out} --model models/mine.onnx");
+        } else {
+            println!("done; next: gleaner-train evaluate --run {out}");
+        }
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::lanes::{LANES, Lanes, vectorised};
 use super::rowwise::add_rows;
-use super::shape::{Layout, Linear};
+use super::shape::Linear;
 
 /// Rows of a tile: with AVX2, six rows of sixteen take twelve of the sixteen registers.
 const TILE: usize = 6;
@@ -189,22 +189,23 @@ vectorised! {
 pub(super) struct CutWeights(Vec<Panels>);
 
 impl CutWeights {
-    /// Cuts every weight, or its transpose.
-    fn cut(&mut self, layout: &Layout, mut cut: impl FnMut(&Linear, &mut Panels)) {
-        self.0.resize_with(layout.linear_count, Panels::default);
-        for linear in layout.linears() {
+    fn cut(&mut self, linears: impl IntoIterator<Item = Linear>, mut cut: impl FnMut(&Linear, &mut Panels)) {
+        for linear in linears {
+            if self.0.len() <= linear.index {
+                self.0.resize_with(linear.index + 1, Panels::default);
+            }
             cut(&linear, &mut self.0[linear.index]);
         }
     }
 
-    /// Prepares the forward direction.
-    pub fn cut_forward(&mut self, layout: &Layout, parameters: &[f32]) {
-        self.cut(layout, |linear, panels| panels.cut_transposed(linear.weight(parameters), linear.inputs));
+    /// Prepares the forward direction of these layers.
+    pub fn cut_forward(&mut self, linears: impl IntoIterator<Item = Linear>, parameters: &[f32]) {
+        self.cut(linears, |linear, panels| panels.cut_transposed(linear.weight(parameters), linear.inputs));
     }
 
-    /// Prepares the backward direction.
-    pub fn cut_backward(&mut self, layout: &Layout, parameters: &[f32]) {
-        self.cut(layout, |linear, panels| panels.cut(linear.weight(parameters), linear.inputs));
+    /// Prepares the backward direction of these layers.
+    pub fn cut_backward(&mut self, linears: impl IntoIterator<Item = Linear>, parameters: &[f32]) {
+        self.cut(linears, |linear, panels| panels.cut(linear.weight(parameters), linear.inputs));
     }
 }
 
@@ -217,6 +218,11 @@ impl Linear {
     /// `y = max(x W^T + b, 0)`.
     pub fn forward_rectified(&self, parameters: &[f32], weights: &CutWeights, x: &[f32], y: &mut [f32]) {
         product(x, &weights.0[self.index], self.bias(parameters), Then::Rectify, y);
+    }
+
+    /// `y += x W^T`, without the bias.
+    pub fn add_forward(&self, weights: &CutWeights, x: &[f32], y: &mut [f32]) {
+        product(x, &weights.0[self.index], &[], Then::Add, y);
     }
 
     /// `dx = dy W`; `weights` cut for the backward direction.
@@ -234,7 +240,9 @@ impl Linear {
         let (weight, bias) = self.split_mut(gradients);
         panels.cut(x, self.inputs);
         add_transposed_product(dy, self.outputs, panels, weight);
-        add_rows(dy, bias);
+        if self.biased {
+            add_rows(dy, bias);
+        }
     }
 }
 

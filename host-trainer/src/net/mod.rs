@@ -1,4 +1,7 @@
-//! The attention network: forward, backward, Adam. Written out by hand, on one thread.
+//! The networks: forward, backward, Adam. Written out by hand, on one thread.
+//!
+//! [`Shape`] is the attention network that flies; [`MapShape`] and [`VectorShape`] are those that the paper compares
+//! it with. What a learner asks of any of them is [`Architecture`]. The rest of this page is about the first.
 //!
 //! One flat `f32` vector holds all parameters of a network; [`Shape::tensors`] says what lies
 //! where. A sample is a set of tokens: UAV, preference, local map, and one for each device that is
@@ -34,9 +37,14 @@
 //!
 //! Scores are divided by 4, the root of the head width. Pooling over no devices gives zeros.
 
+mod architecture;
 mod attention;
 mod batch;
+mod convolution;
+mod features;
+mod head;
 mod lanes;
+mod maps;
 mod matrix;
 mod optimiser;
 mod passes;
@@ -45,9 +53,17 @@ mod shape;
 mod workspace;
 
 #[cfg(test)]
+mod baseline_tests;
+#[cfg(test)]
 mod tests;
 
+pub use architecture::{Architecture, Samples};
 pub use batch::{Batch, DeviceFeatures, Sample};
+pub use features::{VECTOR_FEATURES, VectorBatch, VectorShape, VectorWorkspace};
+pub use maps::{
+    GLOBAL_NUMBERS, GLOBAL_SIZE, GLOBAL_WINDOW, LOCAL_NUMBERS, LOCAL_SIDE, MAP_CHANNELS, MapBatch, MapShape,
+    MapWorkspace,
+};
 pub use optimiser::{Adam, polyak};
 pub use passes::{backward, forward, forward_backward};
 pub use shape::{

@@ -26,7 +26,7 @@ pub fn forward<'a>(
     let chunks = batch.len().div_ceil(CHUNK);
     workspace.chunks.resize_with(chunks.max(workspace.chunks.len()), Activations::default);
     workspace.outputs.resize(batch.len() * shape.outputs, 0.0);
-    workspace.forward_weights.cut_forward(&layout, parameters);
+    workspace.forward_weights.cut_forward(layout.linears(), parameters);
     let net = Net { layout: &layout, parameters, weights: &workspace.forward_weights };
     let outputs = workspace.outputs.chunks_mut(CHUNK * shape.outputs);
     for (index, (chunk, outputs)) in workspace.chunks.iter_mut().zip(outputs).enumerate() {
@@ -54,7 +54,7 @@ pub fn backward(
     let layout = layout_for(shape, parameters);
     assert_eq!(gradients.len(), layout.len, "one gradient a parameter");
     assert_eq!(d_outputs.len(), batch.len() * shape.outputs, "one gradient an output");
-    workspace.backward_weights.cut_backward(&layout, parameters);
+    workspace.backward_weights.cut_backward(layout.linears(), parameters);
     let Workspace { chunks, scratch, backward_weights: weights, .. } = workspace;
     let net = Net { layout: &layout, parameters, weights };
     for (chunk, d_outputs) in chunks.iter().zip(d_outputs.chunks(CHUNK * shape.outputs)) {
@@ -79,8 +79,8 @@ pub fn forward_backward(
     assert_eq!(gradients.len(), layout.len, "one gradient a parameter");
     workspace.chunks.resize_with(workspace.chunks.len().max(1), Activations::default);
     workspace.outputs.resize(batch.len() * shape.outputs, 0.0);
-    workspace.forward_weights.cut_forward(&layout, parameters);
-    workspace.backward_weights.cut_backward(&layout, parameters);
+    workspace.forward_weights.cut_forward(layout.linears(), parameters);
+    workspace.backward_weights.cut_backward(layout.linears(), parameters);
     let Workspace { chunks, scratch, outputs, forward_weights, backward_weights } = workspace;
     let ahead = Net { layout: &layout, parameters, weights: forward_weights };
     let back = Net { weights: backward_weights, ..ahead };

@@ -143,6 +143,13 @@ vectorised! {
     ) = norm_backward_body
 }
 
+/// `x = max(x, 0)`.
+pub(super) fn rectify(x: &mut [f32]) {
+    for x in x {
+        *x = if *x > 0.0 { *x } else { 0.0 };
+    }
+}
+
 vectorised! {
     /// Clears `d` where the rectifier's output was 0.
     pub(super) fn rectify_backward(rectified: &[f32], d: &mut [f32]) = rectify_backward_body

@@ -73,14 +73,41 @@ impl Tensor {
     }
 }
 
-/// Where a linear layer `y = x W^T + b` lies: the weight `[outputs, inputs]`, then the bias.
+/// Where a linear layer `y = x W^T + b` lies: the weight `[outputs, inputs]`, then the bias, if it has one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Linear {
-    /// Its place among the layers, below [`Layout::linear_count`].
+    /// Its place among the layers of its network.
     pub index: usize,
     pub offset: usize,
     pub inputs: usize,
     pub outputs: usize,
+    pub biased: bool,
+}
+
+/// Lays linear layers out one after another.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Ruler {
+    /// Numbers laid out so far.
+    pub len: usize,
+    /// Layers laid out so far.
+    pub count: usize,
+}
+
+impl Ruler {
+    pub fn linear(&mut self, inputs: usize, outputs: usize) -> Linear {
+        self.lay(inputs, outputs, true)
+    }
+
+    pub fn unbiased(&mut self, inputs: usize, outputs: usize) -> Linear {
+        self.lay(inputs, outputs, false)
+    }
+
+    fn lay(&mut self, inputs: usize, outputs: usize, biased: bool) -> Linear {
+        let linear = Linear { index: self.count, offset: self.len, inputs, outputs, biased };
+        self.len += (inputs + usize::from(biased)) * outputs;
+        self.count += 1;
+        linear
+    }
 }
 
 impl Linear {
@@ -90,13 +117,32 @@ impl Linear {
 
     pub fn bias<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
         let start = self.offset + self.inputs * self.outputs;
-        &parameters[start..start + self.outputs]
+        &parameters[start..start + if self.biased { self.outputs } else { 0 }]
+    }
+
+    /// The tensors of a layer with this name.
+    pub fn tensors(&self, name: &str) -> Vec<Tensor> {
+        let (rows, cols) = (self.outputs, self.inputs);
+        let weight = Tensor { name: format!("{name}.weight"), offset: self.offset, rows, cols };
+        let bias = Tensor { name: format!("{name}.bias"), offset: self.offset + rows * cols, rows, cols: 1 };
+        if self.biased { vec![weight, bias] } else { vec![weight] }
+    }
+
+    /// Draws weight and bias as PyTorch does by default: uniform in +-1/sqrt(inputs) (Kaiming uniform with
+    /// a = sqrt 5); `inputs` counts those of a layer beside this one whose sum with it is one layer.
+    pub fn initialise(&self, inputs: usize, parameters: &mut [f32], rng: &mut impl Rng) {
+        let bound = 1.0 / (inputs as f32).sqrt();
+        let (weight, bias) = self.split_mut(parameters);
+        for value in weight.iter_mut().chain(bias) {
+            *value = bound * (2.0 * rng.random::<f32>() - 1.0);
+        }
     }
 
     /// The weight's and the bias's part of a vector of gradients.
     pub fn split_mut<'a>(&self, gradients: &'a mut [f32]) -> (&'a mut [f32], &'a mut [f32]) {
         let weights = self.inputs * self.outputs;
-        gradients[self.offset..self.offset + weights + self.outputs].split_at_mut(weights)
+        let biases = if self.biased { self.outputs } else { 0 };
+        gradients[self.offset..self.offset + weights + biases].split_at_mut(weights)
     }
 }
 
@@ -140,19 +186,13 @@ pub(super) struct Layout {
     pub project_device: Linear,
     pub encoder: [EncoderLayout; LAYERS],
     pub head: [Linear; 2],
-    pub linear_count: usize,
     pub len: usize,
 }
 
 impl Layout {
     pub fn new(shape: Shape) -> Self {
-        let (mut len, mut linear_count) = (0, 0);
-        let mut linear = |inputs, outputs| {
-            let linear = Linear { index: linear_count, offset: len, inputs, outputs };
-            len += (inputs + 1) * outputs;
-            linear_count += 1;
-            linear
-        };
+        let mut ruler = Ruler::default();
+        let mut linear = |inputs, outputs| ruler.linear(inputs, outputs);
         let project_uav = linear(UAV_FEATURES, WIDTH);
         let project_preference = linear(PREFERENCE_FEATURES, WIDTH);
         let project_map = linear(MAP_CELLS, WIDTH);
@@ -168,16 +208,7 @@ impl Layout {
             EncoderLayout { qkv, out, norm1, ff1, ff2, norm2 }
         });
         let head = [linear(HEAD_INPUTS, shape.head), linear(shape.head, shape.outputs)];
-        Self {
-            project_uav,
-            project_preference,
-            project_map,
-            project_device,
-            encoder,
-            head,
-            linear_count,
-            len,
-        }
+        Self { project_uav, project_preference, project_map, project_device, encoder, head, len: ruler.len }
     }
 
     /// The linear layers in the order of the flat vector.
@@ -233,19 +264,7 @@ impl Shape {
         let layout = Layout::new(*self);
         let mut tensors = Vec::new();
         for (name, linear) in layout.named_linears() {
-            let weights = linear.inputs * linear.outputs;
-            tensors.push(Tensor {
-                name: format!("{name}.weight"),
-                offset: linear.offset,
-                rows: linear.outputs,
-                cols: linear.inputs,
-            });
-            tensors.push(Tensor {
-                name: format!("{name}.bias"),
-                offset: linear.offset + weights,
-                rows: linear.outputs,
-                cols: 1,
-            });
+            tensors.extend(linear.tensors(&name));
         }
         for (name, norm) in layout.norms() {
             for (part, offset) in [("weight", norm.offset), ("bias", norm.offset + WIDTH)] {
@@ -256,18 +275,13 @@ impl Shape {
         tensors
     }
 
-    /// Fresh parameters as PyTorch draws them by default: weights and biases of a linear layer
-    /// uniform in +-1/sqrt(inputs) (Kaiming uniform with a = sqrt 5), gains 1, norm biases 0.
+    /// Fresh parameters as PyTorch draws them by default; gains 1, norm biases 0.
     #[must_use]
     pub fn initialise(&self, rng: &mut impl Rng) -> Vec<f32> {
         let layout = Layout::new(*self);
         let mut parameters = vec![0.0; layout.len];
         for linear in layout.linears() {
-            let bound = 1.0 / (linear.inputs as f32).sqrt();
-            let (weight, bias) = linear.split_mut(&mut parameters);
-            for value in weight.iter_mut().chain(bias) {
-                *value = bound * (2.0 * rng.random::<f32>() - 1.0);
-            }
+            linear.initialise(linear.inputs, &mut parameters, rng);
         }
         for (_, norm) in layout.norms() {
             norm.split_mut(&mut parameters).0.fill(1.0);

@@ -1,0 +1,108 @@
+//! How a system sees a flight: what it remembers of a state, and how it shows that to its network.
+
+use crate::flight::Flight;
+use crate::net::{Architecture, Batch, Shape, VECTOR_FEATURES, VectorBatch, VectorShape};
+use crate::observation::Observation;
+use crate::system::System;
+use gleaner_policy::{Preference, schema};
+use gleaner_world::World;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+
+/// One of the paper's state representations (section III-C) with the network that reads it.
+pub trait Encoding: Debug {
+    /// What the replay memory keeps of a state: without the preference, and without what the world can tell again.
+    type Observation: Clone + Debug + PartialEq + Serialize + DeserializeOwned;
+    /// What reads it.
+    type Network: Architecture;
+    /// The system that soft actor-critic and this encoding make.
+    const MOSAC: System;
+
+    /// The encoding of flights in this world.
+    fn of(world: &World) -> Self;
+
+    /// The present state.
+    fn observe(&self, flight: &Flight) -> Self::Observation;
+
+    /// Appends a state to a batch, once under each of the preferences.
+    fn push(&self, seen: &Self::Observation, preferences: &[Preference], batch: &mut BatchOf<Self>);
+
+    /// Battery units that the way to the terminal takes.
+    fn way_to_terminal(seen: &Self::Observation) -> f32;
+}
+
+/// The batches of an encoding's network.
+pub type BatchOf<E> = <<E as Encoding>::Network as Architecture>::Batch;
+/// The memory of an encoding's network.
+pub type WorkspaceOf<E> = <<E as Encoding>::Network as Architecture>::Workspace;
+
+/// The weights of a preference as the networks read them.
+pub(crate) fn weights(preference: Preference) -> [f32; 2] {
+    [preference.w_data(), preference.w_energy()]
+}
+
+/// The set of tokens that flies.
+#[derive(Clone, Copy, Debug)]
+pub struct Attention;
+
+impl Encoding for Attention {
+    type Observation = Observation;
+    type Network = Shape;
+    const MOSAC: System = System::MosacAtt;
+
+    fn of(_: &World) -> Attention {
+        Attention
+    }
+
+    fn observe(&self, flight: &Flight) -> Observation {
+        flight.observe()
+    }
+
+    fn push(&self, seen: &Observation, preferences: &[Preference], batch: &mut Batch) {
+        let mut sample = seen.with(Preference::ENERGY);
+        for &preference in preferences {
+            sample.preference = weights(preference);
+            batch.push_sample(&sample);
+        }
+    }
+
+    fn way_to_terminal(seen: &Observation) -> f32 {
+        seen.way_to_terminal()
+    }
+}
+
+/// The numbers of the same tokens, without the map, side by side (paper, eq. 15). The paper fixes K; here there is a
+/// place for each of the K_max devices, and those that are absent are zeros.
+#[derive(Clone, Copy, Debug)]
+pub struct FeatureVector;
+
+/// The numbers of the aircraft and of the devices that are present, normalised.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Features(Vec<f32>);
+
+impl Encoding for FeatureVector {
+    type Observation = Features;
+    type Network = VectorShape;
+    const MOSAC: System = System::MosacFtv;
+
+    fn of(_: &World) -> FeatureVector {
+        FeatureVector
+    }
+
+    fn observe(&self, flight: &Flight) -> Features {
+        let sample = flight.observe().with(flight.preference());
+        Features([&sample.uav[..], sample.devices_present().as_flattened()].concat())
+    }
+
+    fn push(&self, seen: &Features, preferences: &[Preference], batch: &mut VectorBatch) {
+        let mut numbers = [0.0; VECTOR_FEATURES];
+        numbers[..seen.0.len()].copy_from_slice(&seen.0);
+        let preferences: Vec<_> = preferences.iter().copied().map(weights).collect();
+        batch.push(&numbers, &preferences);
+    }
+
+    fn way_to_terminal(seen: &Features) -> f32 {
+        (seen.0[1] - seen.0[0]) * schema::BATTERY.scale
+    }
+}

@@ -1,0 +1,180 @@
+//! What a run leaves behind: the best parameters, which system they are of, and how to fly them.
+
+use crate::checkpoint::{self, CheckpointError};
+use crate::encoding::Encoding;
+use crate::evaluation::{Decider, DeciderError, Network};
+use crate::flight::Flight;
+use crate::learner::{Asked, DdqnCgl, Learner, MosacCgl, MosacFtv};
+use crate::net::Shape;
+use crate::settings::{Settings, as_json};
+use crate::system::System;
+use gleaner_units::Action;
+use gleaner_world::World;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// The best parameters' name inside the output folder.
+pub const LEARNED: &str = "learned.checkpoint";
+
+/// The best parameters of a run by validation, and how they came about: what `evaluate` and `export` read.
+///
+/// In the file the system's name stands before everything else. Files that begin with a method instead are older than
+/// the systems: they hold MOSAC-ATT.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Learned {
+    /// Whose parameters they are.
+    #[serde(skip)]
+    pub system: System,
+    /// The command that made them: `train` or `distil`, with what is not a setting.
+    pub method: String,
+    /// Its settings.
+    #[serde(with = "as_json")]
+    pub settings: Settings,
+    /// The network that decides: the actor, or the values of DDQN.
+    pub actor: Vec<f32>,
+    /// Update at which it was found.
+    pub update: u64,
+    /// Slots flown until then.
+    pub steps: u64,
+    /// Mean hypervolume on the validation realizations.
+    pub score: f64,
+}
+
+/// Why learned parameters cannot be used.
+#[derive(Debug, Error)]
+pub enum LearnedError {
+    /// The file.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// Parameters of a network with other shapes.
+    #[error(
+        "{}: {found} parameters, and {system} has {expected} in this version; train it anew",
+        path.display()
+    )]
+    OtherNetwork {
+        /// The file.
+        path: PathBuf,
+        /// Whose parameters it says they are.
+        system: System,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// Another system than the one that can be used here.
+    #[error("{}: holds a policy of {found}; give a run of {expected}", path.display())]
+    OtherSystem {
+        /// The file.
+        path: PathBuf,
+        /// Whose parameters they are.
+        found: System,
+        /// Whose they should be.
+        expected: System,
+    },
+}
+
+impl Learned {
+    /// Reads what a run in `folder` has learned so far; `None` before its first validation.
+    ///
+    /// # Errors
+    /// The file is damaged, or holds the parameters of another network.
+    pub fn load(folder: &Path) -> Result<Option<Learned>, LearnedError> {
+        let path = folder.join(LEARNED);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let named = checkpoint::load_named(&path)?;
+        let learned = match named.name().parse() {
+            Ok(system) => Learned { system, ..named.value()? },
+            Err(_) => named.unnamed()?,
+        };
+        let (system, found) = (learned.system, learned.actor.len());
+        let expected = system.parameter_count();
+        if found == expected {
+            Ok(Some(learned))
+        } else {
+            Err(LearnedError::OtherNetwork { path, system, found, expected })
+        }
+    }
+
+    /// As [`Learned::load`] where only one system will do.
+    ///
+    /// # Errors
+    /// Those of [`Learned::load`]; it is of another system.
+    pub fn load_of(system: System, folder: &Path) -> Result<Option<Learned>, LearnedError> {
+        match Learned::load(folder)? {
+            Some(Learned { system: found, .. }) if found != system => {
+                Err(LearnedError::OtherSystem { path: folder.join(LEARNED), found, expected: system })
+            }
+            learned => Ok(learned),
+        }
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// The disk; the last good file is then still there.
+    pub fn save(&self, folder: &Path) -> Result<(), CheckpointError> {
+        checkpoint::save_named(&folder.join(LEARNED), self.system.name(), self)
+    }
+
+    /// What flies it in an evaluation, in batches, in any city.
+    #[must_use]
+    pub fn decider(&self) -> Box<dyn Decider + '_> {
+        match self.system {
+            // The same numbers, and it tells its attention.
+            System::MosacAtt => Box::new(Network::new(Shape::actor(), &self.actor)),
+            System::MosacCgl => Box::new(Trained::<MosacCgl>::new(&self.actor)),
+            System::DdqnCgl => Box::new(Trained::<DdqnCgl>::new(&self.actor)),
+            System::MosacFtv => Box::new(Trained::<MosacFtv>::new(&self.actor)),
+        }
+    }
+}
+
+/// A system's network, deciding without exploring.
+pub struct Trained<'a, L: Learner> {
+    parameters: &'a [f32],
+    asked: Asked<L::Encoding>,
+    /// The encoding, and the world that it was made for.
+    sees: Option<(Arc<World>, L::Encoding)>,
+}
+
+impl<'a, L: Learner> Trained<'a, L> {
+    /// The deciding network with these parameters.
+    #[must_use]
+    pub fn new(parameters: &'a [f32]) -> Trained<'a, L> {
+        Trained { parameters, asked: Asked::new(L::network()), sees: None }
+    }
+}
+
+impl<L: Learner> Decider for Trained<'_, L> {
+    /// # Panics
+    /// When the flights are not all in one world.
+    fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError> {
+        let Some(first) = flights.first() else { return Ok(Vec::new()) };
+        let world = first.episode().world();
+        assert!(
+            flights.iter().all(|flight| Arc::ptr_eq(flight.episode().world(), world)),
+            "one world at a time"
+        );
+        if !self.sees.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, world)) {
+            self.sees = Some((Arc::clone(world), L::Encoding::of(world)));
+        }
+        let Some((_, encoding)) = &self.sees else { return Ok(Vec::new()) };
+        let seen: Vec<_> = flights.iter().map(|flight| encoding.observe(flight)).collect();
+        let states = seen.iter().zip(flights).map(|(seen, flight)| (seen, flight.preference()));
+        let answers = self.asked.answer(encoding, self.parameters, states);
+        let answers = answers.chunks_exact(answers.len() / flights.len());
+        flights
+            .iter()
+            .zip(answers)
+            .map(|(flight, answer)| {
+                let scores = L::scores(answer, flight.preference());
+                let action = flight.mask().argmax(&scores);
+                action.ok_or_else(|| DeciderError("the network's answer is not a number".into()))
+            })
+            .collect()
+    }
+}

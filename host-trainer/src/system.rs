@@ -1,0 +1,106 @@
+//! The systems that the paper compares, by name.
+
+use crate::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
+use crate::net::Architecture;
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// A learning algorithm with a way of seeing (paper, section V-B).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum System {
+    /// Soft actor-critic, a set of tokens, attention: the one that flies.
+    #[default]
+    MosacAtt,
+    /// Soft actor-critic, centred local and global maps, convolutions.
+    MosacCgl,
+    /// Double deep Q-network on the same maps.
+    DdqnCgl,
+    /// Soft actor-critic, feature vector, feed-forward.
+    MosacFtv,
+}
+
+/// Not the name of a system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("unknown system: use mosac-att, mosac-cgl, ddqn-cgl or mosac-ftv")]
+pub struct UnknownSystem;
+
+impl System {
+    /// All of them, in the paper's order.
+    pub const ALL: [System; 4] = [System::MosacAtt, System::DdqnCgl, System::MosacCgl, System::MosacFtv];
+
+    /// The name in files and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            System::MosacAtt => "mosac-att",
+            System::MosacCgl => "mosac-cgl",
+            System::DdqnCgl => "ddqn-cgl",
+            System::MosacFtv => "mosac-ftv",
+        }
+    }
+
+    /// The name in the paper's tables.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            System::MosacAtt => "MOSAC-ATT",
+            System::MosacCgl => "MOSAC-CGL",
+            System::DdqnCgl => "DDQN-CGL",
+            System::MosacFtv => "MOSAC-FTV",
+        }
+    }
+
+    /// Parameters of the network that decides.
+    #[must_use]
+    pub fn parameter_count(self) -> usize {
+        fn of<L: Learner>() -> usize {
+            L::network().parameter_count()
+        }
+        match self {
+            System::MosacAtt => of::<MosacAtt>(),
+            System::MosacCgl => of::<MosacCgl>(),
+            System::DdqnCgl => of::<DdqnCgl>(),
+            System::MosacFtv => of::<MosacFtv>(),
+        }
+    }
+
+    /// The count that the paper prints. Its text does not settle the shapes behind it: ours follow the text.
+    #[must_use]
+    pub const fn parameter_count_in_paper(self) -> Option<usize> {
+        match self {
+            System::MosacAtt => Some(91_781),
+            System::MosacCgl => Some(165_829),
+            System::DdqnCgl | System::MosacFtv => None,
+        }
+    }
+}
+
+impl fmt::Display for System {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for System {
+    type Err = UnknownSystem;
+
+    fn from_str(name: &str) -> Result<System, UnknownSystem> {
+        System::ALL.into_iter().find(|system| system.name() == name).ok_or(UnknownSystem)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_come_back_and_the_policy_that_flies_is_the_smallest_that_learns_maps_or_sets() {
+        for system in System::ALL {
+            assert_eq!(system.name().parse(), Ok(system));
+        }
+        assert_eq!("greedy".parse::<System>(), Err(UnknownSystem));
+        let counts = System::ALL.map(System::parameter_count);
+        assert_eq!(counts, [91_077, 187_850, 186_565, 84_229]);
+    }
+}

@@ -1,0 +1,70 @@
+//! The realizations that choose the best parameters of a run.
+
+use crate::evaluation::{Decider, DeciderError, Network, Table, evaluate};
+use crate::net::Shape;
+use crate::settings::Settings;
+use gleaner_world::{Realization, ScenarioError, ScenarioKind, Seed, World};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Realizations that choose the best parameters have numbers from here on; those that judge count from 0.
+const VALIDATION_FROM: u64 = 10_000;
+const VALIDATION_COUNT: u64 = 60;
+
+/// Per scenario that is trained: name and validation table.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Tables(pub Vec<(String, Table)>);
+
+impl Tables {
+    /// What the best parameters are chosen by: the mean hypervolume over the scenarios.
+    #[must_use]
+    pub fn score(&self) -> f64 {
+        self.0.iter().map(|(_, table)| table.hypervolume).sum::<f64>() / self.0.len().max(1) as f64
+    }
+}
+
+/// The realizations that choose the best parameters: other ones than those that are trained on and those that judge.
+#[derive(Clone, Debug)]
+pub struct Validation(Vec<(ScenarioKind, Vec<(Seed, Realization)>)>);
+
+impl Validation {
+    /// Those of the scenarios that the settings train.
+    ///
+    /// # Errors
+    /// The scenario does not fit the city.
+    pub fn draw(world: &World, settings: &Settings) -> Result<Validation, ScenarioError> {
+        let shares = [settings.share_rd, settings.share_rb];
+        let trained = ScenarioKind::ALL.into_iter().zip(shares).filter(|(_, share)| *share > 0.0);
+        trained
+            .map(|(kind, _)| {
+                let numbers = VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT;
+                let drawn = numbers.map(|number| {
+                    let seed = Seed::evaluation(number);
+                    Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))
+                });
+                Ok((kind, drawn.collect::<Result<_, ScenarioError>>()?))
+            })
+            .collect::<Result<_, _>>()
+            .map(Validation)
+    }
+
+    /// The paper's metrics of a decider on them.
+    ///
+    /// # Errors
+    /// The decider failed.
+    pub fn tables(&self, world: &Arc<World>, decider: &mut dyn Decider) -> Result<Tables, DeciderError> {
+        let mut table = |(kind, realizations): &(ScenarioKind, Vec<(Seed, Realization)>)| {
+            Ok((kind.name().to_owned(), evaluate(world, realizations, decider)?))
+        };
+        self.0.iter().map(&mut table).collect::<Result<_, _>>().map(Tables)
+    }
+
+    /// The paper's metrics of a MOSAC-ATT actor on them.
+    ///
+    /// # Errors
+    /// The network's answer is not a number: the run diverged.
+    pub fn judge(&self, world: &Arc<World>, actor: &[f32]) -> Result<Tables, DeciderError> {
+        self.tables(world, &mut Network::new(Shape::actor(), actor))
+    }
+}
