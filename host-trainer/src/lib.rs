@@ -16,9 +16,8 @@
 //!
 //! The policies that fly come another way: [`distil`] copies the [`teacher`], who knows what the aircraft cannot see,
 //! and [`refine`] lets the pupil learn from its own flights. What they are measured against is the [`oracle`]: the
-//! best tour that the [`planner`] finds, and a [`bound`] on what anybody could.
+//! best tour that the [`planner`] finds for someone who knows everything.
 
-pub mod bound;
 pub mod checkpoint;
 pub mod ddqn;
 pub mod distil;

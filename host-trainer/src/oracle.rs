@@ -1,18 +1,16 @@
-//! The oracle: what a planner that knows map, channel and devices plans for, and what nobody can exceed.
+//! The oracle: what a planner that knows map, channel and devices plans for. A strong lower bound of the optimum, not
+//! the optimum.
 
-use crate::bound::Bounder;
 use crate::evaluation::test_preferences;
 use crate::flight::Reward;
 use crate::planner::{DEVICES_MAX, Effort, Problem, Rates, State, Tour};
-use gleaner_world::{Realization, World};
+use gleaner_world::Realization;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 /// The largest weight of data that is planned with: of tours that bring the same, the shorter one is the better.
 const THRIFT: f32 = 0.99;
-/// Steps towards a low bound.
-const BOUND_STEPS: usize = 120;
 
 /// The oracle in one setting: a line of the file that `gleaner-train oracle` writes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,8 +25,6 @@ pub struct OracleSetting {
     pub realizations: u64,
     /// For each test preference and each realization, what the best tour brings in the mean.
     pub missions: Vec<Vec<Reward>>,
-    /// For each realization, percent of the data that no policy can exceed in the mean.
-    pub upper_bound_percent: Vec<f32>,
 }
 
 /// How hard to look for the best tour of a mission under one preference: two searches, one of them from the best
@@ -39,14 +35,9 @@ pub struct Thoroughness {
     pub tours: u32,
 }
 
-/// One mission under every test preference, and its bound at w = (1, 0) in percent.
+/// One mission under every test preference: percent of data, and minus battery units.
 #[must_use]
-pub fn consult(
-    world: &World,
-    rates: &Rates,
-    realization: &Realization,
-    thoroughness: Thoroughness,
-) -> (Vec<Reward>, f32) {
+pub fn consult(rates: &Rates, realization: &Realization, thoroughness: Thoroughness) -> Vec<Reward> {
     let known = rates.study(realization);
     let mut remaining = [0.0; DEVICES_MAX];
     for (remaining, device) in remaining.iter_mut().zip(realization.devices()) {
@@ -61,7 +52,7 @@ pub fn consult(
     };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut tour = Tour::default();
-    let rewards: Vec<Reward> = test_preferences()
+    test_preferences()
         .iter()
         .map(|preference| {
             let problem = Problem { known: &known, state: &state, w_data: preference.w_data().min(THRIFT) };
@@ -75,7 +66,5 @@ pub fn consult(
             let percent = 100.0 * end.collected / known.initial_units().max(1.0);
             [percent, -0.5 * (state.hovers_left - end.hovers_left) as f32]
         })
-        .collect();
-    let bound = Bounder::new(world, realization).bound(1.0, BOUND_STEPS);
-    (rewards, bound.min(100.0))
+        .collect()
 }

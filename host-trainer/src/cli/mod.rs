@@ -30,7 +30,7 @@ enum Command {
     Refine(train::RefineArguments),
     /// Print the paper's metrics of a model, a checkpoint and GREEDY.
     Evaluate(evaluate::Arguments),
-    /// Find out what a planner that knows everything would reach, and what nobody can exceed.
+    /// Find out what a planner that knows map, channel and devices reaches: what policies are measured against.
     Oracle(oracle::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
     Export(export::Arguments),

@@ -55,16 +55,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 battery,
                 realizations: arguments.realizations,
                 missions: vec![Vec::new(); test_preferences().len()],
-                upper_bound_percent: Vec::new(),
             };
             let bar = bar(arguments.realizations, format!("{kind} K={devices} B={battery}"));
             for (_, realization) in realizations(&world, &scenario, arguments.realizations)? {
                 let thoroughness = Thoroughness { tours: arguments.tours };
-                let (rewards, bound) = consult(&world, &rates, &realization, thoroughness);
+                let rewards = consult(&rates, &realization, thoroughness);
                 for (list, reward) in setting.missions.iter_mut().zip(rewards) {
                     list.push(reward);
                 }
-                setting.upper_bound_percent.push(bound);
                 bar.inc(1);
             }
             bar.finish_and_clear();
@@ -98,13 +96,12 @@ fn summary(setting: &OracleSetting) -> String {
     let data = |index: usize| mean(&mut setting.missions[index].iter().map(|reward| reward[0]));
     let energy = |index: usize| -mean(&mut setting.missions[index].iter().map(|reward| reward[1]));
     format!(
-        "{} K={} B={}: {:.1} % of the data for {:.1} units, bound {:.1} %; least energy {:.2}",
+        "{} K={} B={}: {:.1} % of the data for {:.1} units; least energy {:.2}",
         setting.scenario,
         setting.devices,
         setting.battery,
         data(setting.missions.len() - 1),
         energy(setting.missions.len() - 1),
-        mean(&mut setting.upper_bound_percent.iter().copied()),
         energy(0),
     )
 }

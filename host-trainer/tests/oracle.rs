@@ -1,0 +1,85 @@
+//! The oracle plans what can be flown, and better than anyone who knows less.
+
+use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations, test_preferences};
+use gleaner_host_trainer::oracle::{Thoroughness, consult};
+use gleaner_host_trainer::planner::{DEVICES_MAX, Effort, Problem, Rates, State, Tour};
+use gleaner_units::{Action, BatteryUnits};
+use gleaner_world::{Realization, ScenarioKind, Seed, World};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+const QUICK: Thoroughness = Thoroughness { tours: 4_000 };
+
+fn start(realization: &Realization) -> State {
+    let mut remaining = [0.0; DEVICES_MAX];
+    for (remaining, device) in remaining.iter_mut().zip(realization.devices()) {
+        *remaining = device.data_units;
+    }
+    let hovers_left = (2.0 * realization.battery().0) as i32;
+    State { cell: realization.start(), hovers_left, remaining, collected: 0.0, over: false }
+}
+
+#[test]
+fn it_beats_greedy_and_flies_the_shortest_way_for_energy_alone() {
+    let world = Arc::new(World::default_world());
+    let rates = Rates::new(Arc::clone(&world));
+    for (kind, least) in [(ScenarioKind::ReachDestination, 32.0), (ScenarioKind::ReturnBase, 2.0)] {
+        let drawn = realizations(&world, &kind.scenario(), 10).unwrap();
+        let rewards: Vec<_> =
+            drawn.iter().map(|(_, realization)| consult(&rates, realization, QUICK)).collect();
+        let data = rewards.iter().map(|rewards| rewards.last().unwrap()[0]).sum::<f32>() / 10.0;
+        let greedy = evaluate_greedy(&world, &drawn).coverage();
+        assert!(data > greedy + 10.0, "{kind}: {data} % against {greedy} %");
+        for rewards in rewards {
+            assert_eq!(rewards.len(), test_preferences().len());
+            assert_eq!(rewards[0][1], -least, "{kind}");
+            assert!(rewards.iter().all(|reward| reward[0] <= 100.0 + 1e-3 && reward[1] >= -80.0));
+        }
+    }
+}
+
+#[test]
+fn every_tour_can_be_flown_whatever_the_search_comes_up_with() {
+    let world = Arc::new(World::default_world());
+    let rates = Rates::new(Arc::clone(&world));
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for number in 0..40 {
+        let kind = ScenarioKind::ALL[number as usize % 2];
+        let battery = BatteryUnits(40.0 + 2.0 * number as f32);
+        let scenario = kind.scenario().with_devices(1 + number as usize % 12).with_battery(battery);
+        let realization = Realization::draw(world.city(), &scenario, Seed::training(number)).unwrap();
+        let (known, state) = (rates.study(&realization), start(&realization));
+        let problem = Problem { known: &known, state: &state, w_data: 0.9 };
+        // Hot to the end, so that the tour is whatever came last.
+        let hot = Effort { tours: 300, temperatures: [1e6, 1e6] };
+        for tour in [problem.anneal(Tour::default(), hot, &mut rng).1, Tour::default()] {
+            let mut end = state;
+            end.finish(&known, &tour);
+            assert!(end.over, "the terminal is reached");
+            assert!(end.hovers_left >= 0, "and the battery lasts");
+            let left: f32 = end.remaining.iter().sum();
+            let held: f32 = state.remaining.iter().sum();
+            assert!((end.collected + left - held).abs() < 1.0, "data is neither made nor lost");
+        }
+    }
+}
+
+#[test]
+fn what_is_planned_is_what_comes_of_it_in_the_mean() {
+    // The mean over many draws of the shadowing, action by action.
+    let world = Arc::new(World::default_world());
+    let rates = Rates::new(Arc::clone(&world));
+    let scenario = ScenarioKind::ReachDestination.scenario().with_devices(1);
+    let realization = Realization::draw(world.city(), &scenario, Seed::training(7)).unwrap();
+    let known = rates.study(&realization);
+    let mut planned = start(&realization);
+    planned.remaining[0] = f32::INFINITY;
+    let above = realization.devices()[0].cell;
+    planned.cell = above;
+    planned.slot(&known, Action::Hover);
+    let channel = world.channel();
+    let mean = world.mean_snr(above, above).unwrap();
+    let expected = channel.expected_data_per_slot(true, mean);
+    assert!((planned.collected - expected).abs() < 0.01 * expected, "{} {expected}", planned.collected);
+}
