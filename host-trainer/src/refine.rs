@@ -1,15 +1,21 @@
 //! Refinement: a policy that has been taught goes on to learn from its own flights.
 //!
 //! The teacher knows what the aircraft does not, so even the best pupil copies decisions that only make sense for
-//! someone who knows. Only what the policy itself earns can correct that. Proximal policy optimisation (Schulman et al. 2017) with vector values:
-//! one critic predicts data and energy still to come under the preference, advantages are estimated for each
-//! objective (Schulman et al. 2016) and weighed by the preference, as the paper weighs its values.
+//! someone who knows. Only what the policy itself earns can correct that: proximal policy optimisation (Schulman et al.
+//! 2017).
+//!
+//! What a mission brings depends more on its devices than on one decision. So the planner, who knows everything, says
+//! at every slot what is still to be had, and the policy is paid by how that changes: shaping by a potential, which
+//! leaves the best policy what it is (Ng, Harada and Russell 1999). A slot that loses nothing pays nothing, and a detour
+//! costs what it costs at once. A critic that sees what the policy sees learns how much it goes on to lose, and advantages
+//! look some slots ahead (Schulman et al. 2016).
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::Network;
-use crate::flight::{Flight, Reward};
+use crate::flight::Flight;
 use crate::mosac::Distribution;
 use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
+use crate::planner::{Prospect, THRIFT};
 use crate::settings::Settings;
 use crate::system::System;
 use crate::train::{Learned, Tables, TrainError, Validation};
@@ -37,11 +43,11 @@ const MINIBATCH: usize = 512;
 /// How far the probability of an action may move from what was flown.
 const CLIP: f32 = 0.15;
 /// Share of the next slot's advantage: bias against noise.
-const TRACE: f32 = 0.97;
+const TRACE: f32 = 0.9;
 /// Weight of the entropy, in standard deviations of the advantage.
 const ENTROPY: f32 = 0.003;
-/// The critic sees data in this many percent, and energy in this many units.
-const VALUE_SCALE: Reward = [40.0, 40.0];
+/// The critic's unit, utility.
+const VALUE_SCALE: f32 = 10.0;
 /// The critic's step size in those of the actor.
 const CRITIC_RATE: f32 = 3.0;
 /// Updates in which only the critic learns.
@@ -59,8 +65,10 @@ struct Experience {
     mask: ActionMask,
     action: Action,
     log_probability: f32,
-    reward: Reward,
-    value: Reward,
+    /// What the slot brought and what it changed of what is still to be had, utility.
+    gain: f32,
+    /// What the critic expected of the gains from here on.
+    value: f32,
     over: bool,
 }
 
@@ -80,6 +88,8 @@ struct Going {
     mission: u64,
     actions: Vec<u8>,
     flight: Flight,
+    prospect: Prospect,
+    ahead: f32,
 }
 
 /// A run of refinement.
@@ -112,7 +122,7 @@ struct Kept {
 }
 
 const fn critic_shape() -> Shape {
-    Shape { outputs: 2, ..Shape::critic() }
+    Shape { outputs: 1, ..Shape::critic() }
 }
 
 impl Refinement {
@@ -186,7 +196,7 @@ impl Refinement {
     }
 
     fn begin(&self, index: usize, mission: u64) -> Result<Going, TrainError> {
-        let Setting { world, reports_missing } = self.variety.setting(mission);
+        let Setting { world, rates, reports_missing } = self.variety.setting(mission);
         let mut drawn = self.settings.mission(world, mission)?;
         if index < SHORTEST && self.settings.share_rb > 0.0 {
             let scenario = ScenarioKind::ReturnBase.scenario().in_city(world.city());
@@ -195,7 +205,9 @@ impl Refinement {
         }
         let flight = Flight::new(world, &drawn.realization, drawn.seed, drawn.preference)?
             .with_reports_missing(reports_missing, drawn.seed);
-        Ok(Going { mission, actions: Vec::new(), flight })
+        let mut prospect = Prospect::new(rates.study(&drawn.realization), mission);
+        let ahead = prospect.value(&flight);
+        Ok(Going { mission, actions: Vec::new(), flight, prospect, ahead })
     }
 
     fn next_flight(&mut self, index: usize) -> Result<Going, TrainError> {
@@ -226,7 +238,8 @@ impl Refinement {
             self.fly(&mut flown)?;
         }
         let samples = self.flights.iter().map(|going| going.flight.observe().with(going.flight.preference()));
-        let ahead = self.values(samples.collect());
+        let samples: Vec<Sample> = samples.collect();
+        let ahead = self.values(&samples);
         let mut lessons = Vec::with_capacity(FLIGHTS * SLOTS);
         for (experiences, ahead) in flown.into_iter().zip(ahead) {
             lessons.extend(judge(experiences, ahead));
@@ -244,16 +257,16 @@ impl Refinement {
         let samples: Vec<Sample> =
             self.flights.iter().map(|going| going.flight.observe().with(going.flight.preference())).collect();
         let logits = Network::new(Shape::actor(), &self.kept.actor).logits(samples.iter().copied());
-        let values = self.values(samples.clone());
+        let values = self.values(&samples);
         for (index, ((sample, logits), value)) in samples.into_iter().zip(logits).zip(values).enumerate() {
             let going = &mut self.flights[index];
             let mask = going.flight.mask();
             let policy = Distribution::new(&logits, mask);
             let action = policy.pick(self.rng.random());
-            let reward = going.step(action);
+            let gain = going.step(action);
             let over = going.flight.is_over();
             let log_probability = policy.log_probability[action.index()];
-            flown[index].push(Experience { sample, mask, action, log_probability, reward, value, over });
+            flown[index].push(Experience { sample, mask, action, log_probability, gain, value, over });
             self.kept.steps += 1;
             if over {
                 self.flights[index] = self.next_flight(index)?;
@@ -262,13 +275,12 @@ impl Refinement {
         Ok(())
     }
 
-    /// What the critic expects from these states: percent of data, and minus battery units.
-    fn values(&mut self, samples: Vec<Sample>) -> Vec<Reward> {
+    /// What the critic expects of the gains from these states on, utility.
+    fn values(&mut self, samples: &[Sample]) -> Vec<f32> {
         self.batch.clear();
         samples.iter().for_each(|sample| self.batch.push_sample(sample));
         let outputs = net::forward(&critic_shape(), &self.kept.critic, &self.batch, &mut self.workspace);
-        let unscale = |value: &[f32; 2]| [value[0] * VALUE_SCALE[0], value[1] * VALUE_SCALE[1]];
-        outputs.as_chunks::<2>().0.iter().map(unscale).collect()
+        outputs.iter().map(|value| value * VALUE_SCALE).collect()
     }
 
     fn learn(&mut self, lessons: &[Lesson]) -> Findings {
@@ -309,13 +321,10 @@ impl Refinement {
             &self.batch,
             &mut self.workspace,
             |range, outputs, gradients| {
-                let rows = outputs.as_chunks::<2>().0.iter().zip(gradients.as_chunks_mut::<2>().0);
-                for ((values, gradients), lesson) in rows.zip(&lessons[range]) {
-                    for objective in 0..2 {
-                        let error = values[objective] - lesson.gained[objective] / VALUE_SCALE[objective];
-                        loss += 0.5 * scale * error * error;
-                        gradients[objective] = scale * error;
-                    }
+                for ((value, gradient), lesson) in outputs.iter().zip(gradients).zip(&lessons[range]) {
+                    let error = value - lesson.gained / VALUE_SCALE;
+                    loss += 0.5 * scale * error * error;
+                    *gradient = scale * error;
                 }
             },
             &mut gradients,
@@ -384,9 +393,13 @@ impl Refinement {
 }
 
 impl Going {
-    fn step(&mut self, action: Action) -> Reward {
+    /// Flies a slot; gives what it gained.
+    fn step(&mut self, action: Action) -> f32 {
         self.actions.push(action.index() as u8);
-        self.flight.step(action)
+        let [data, energy] = self.flight.step(action);
+        let w_data = self.flight.preference().w_data().min(THRIFT);
+        let before = std::mem::replace(&mut self.ahead, self.prospect.value(&self.flight));
+        w_data * data + (1.0 - w_data) * energy + self.ahead - before
     }
 }
 
@@ -399,29 +412,25 @@ struct Lesson {
     /// How much better it went than expected, under the preference.
     advantage: f32,
     /// What was gained from here on: the critic's target.
-    gained: Reward,
+    gained: f32,
 }
 
 /// Generalised advantages of one flight's slots; `ahead` is what the critic expects after the last.
-fn judge(experiences: Vec<Experience>, ahead: Reward) -> Vec<Lesson> {
+fn judge(experiences: Vec<Experience>, ahead: f32) -> Vec<Lesson> {
     let mut lessons = Vec::with_capacity(experiences.len());
-    let (mut next_value, mut next_advantage) = (ahead, [0.0; 2]);
+    let (mut next_value, mut next_advantage) = (ahead, 0.0);
     for experience in experiences.into_iter().rev() {
         if experience.over {
-            (next_value, next_advantage) = ([0.0; 2], [0.0; 2]);
+            (next_value, next_advantage) = (0.0, 0.0);
         }
-        let advantage: Reward = std::array::from_fn(|objective| {
-            experience.reward[objective] + next_value[objective] - experience.value[objective]
-                + TRACE * next_advantage[objective]
-        });
-        let [w_data, w_energy] = experience.sample.preference;
+        let advantage = experience.gain + next_value - experience.value + TRACE * next_advantage;
         lessons.push(Lesson {
             sample: experience.sample,
             mask: experience.mask,
             action: experience.action,
             log_probability: experience.log_probability,
-            advantage: w_data * advantage[0] + w_energy * advantage[1],
-            gained: std::array::from_fn(|objective| advantage[objective] + experience.value[objective]),
+            advantage,
+            gained: advantage + experience.value,
         });
         (next_value, next_advantage) = (experience.value, advantage);
     }

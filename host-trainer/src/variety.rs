@@ -1,5 +1,6 @@
 //! The worlds that a policy is refined in: the default city, and others that it will never meet again.
 
+use crate::planner::Rates;
 use crate::settings::Settings;
 use gleaner_units::Db;
 use gleaner_world::{Channel, City, Fading, Seed, Stream, World};
@@ -16,8 +17,8 @@ const REPORTS_MISSING: f64 = 0.1;
 
 /// The worlds.
 pub struct Variety {
-    usual: Arc<World>,
-    others: Vec<Arc<World>>,
+    usual: (Arc<World>, Rates),
+    others: Vec<(Arc<World>, Rates)>,
     share: f64,
 }
 
@@ -25,6 +26,8 @@ pub struct Variety {
 pub struct Setting<'a> {
     /// The city and its channel.
     pub world: &'a Arc<World>,
+    /// What the planner knows of the channel.
+    pub rates: &'a Rates,
     /// Share of the reports that do not arrive.
     pub reports_missing: f64,
 }
@@ -34,8 +37,13 @@ impl Variety {
     #[must_use]
     pub fn new(usual: &Arc<World>, settings: &Settings) -> Variety {
         let count = if settings.share_cities > 0.0 { CITIES } else { 0 };
-        let others = (CITIES_FROM..CITIES_FROM + count).map(|number| Arc::new(other(number)));
-        Variety { usual: Arc::clone(usual), others: others.collect(), share: settings.share_cities }
+        let with_rates = |world: Arc<World>| (Arc::clone(&world), Rates::new(world));
+        let others = (CITIES_FROM..CITIES_FROM + count).map(|number| with_rates(Arc::new(other(number))));
+        Variety {
+            usual: with_rates(Arc::clone(usual)),
+            others: others.collect(),
+            share: settings.share_cities,
+        }
     }
 
     /// Where the mission with this number is flown.
@@ -43,12 +51,12 @@ impl Variety {
     pub fn setting(&self, mission: u64) -> Setting<'_> {
         let mut rng = Seed::training(mission).repeat(u32::MAX).rng(Stream::Choices);
         let elsewhere = !self.others.is_empty() && rng.random_bool(self.share);
-        if elsewhere {
-            let other = rng.random_range(0..self.others.len());
-            Setting { world: &self.others[other], reports_missing: REPORTS_MISSING }
+        let ((world, rates), reports_missing) = if elsewhere {
+            (&self.others[rng.random_range(0..self.others.len())], REPORTS_MISSING)
         } else {
-            Setting { world: &self.usual, reports_missing: 0.0 }
-        }
+            (&self.usual, 0.0)
+        };
+        Setting { world, rates, reports_missing }
     }
 }
 

@@ -11,3 +11,61 @@ mod tour;
 pub use known::{Audible, Known, Rates};
 pub use search::{Effort, Problem};
 pub use tour::{DEVICES_MAX, State, Stop, Tour};
+
+use crate::flight::Flight;
+use gleaner_units::Cell;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// The largest weight of data that is planned with. With data alone every tour that brings the same would do, and
+/// the search would have nothing to tell the shorter one by.
+pub const THRIFT: f32 = 0.98;
+/// The search from scratch, when a mission begins.
+const BEGIN: Effort = Effort { tours: 6_000, temperatures: [5.0, 0.1] };
+/// The search at every slot, from the tour of the slot before.
+const REFINE: Effort = Effort { tours: 300, temperatures: [0.5, 0.05] };
+
+/// What is still to be had in a mission under way, slot by slot.
+#[derive(Clone, Debug)]
+pub struct Prospect {
+    known: Known,
+    rng: ChaCha8Rng,
+    tour: Option<Tour>,
+    cell: Option<Cell>,
+}
+
+impl Prospect {
+    /// Of a mission that begins; all chance of the search comes from `seed`.
+    #[must_use]
+    pub fn new(known: Known, seed: u64) -> Prospect {
+        Prospect { known, rng: ChaCha8Rng::seed_from_u64(seed), tour: None, cell: None }
+    }
+
+    /// The utility that the best tour brings which is found from where the flight is, `w . (percent, -battery units)`
+    /// with w_data at most [`THRIFT`]; 0 when the flight is over. To be asked once a slot, since the search goes on
+    /// from the tour of the slot before.
+    #[must_use]
+    pub fn value(&mut self, flight: &Flight) -> f32 {
+        if flight.is_over() {
+            return 0.0;
+        }
+        let state = State::of(flight);
+        let w_data = flight.preference().w_data().min(THRIFT);
+        let problem = Problem { known: &self.known, state: &state, w_data };
+        let (value, tour) = match self.tour.take() {
+            None => problem.anneal(Tour::default(), BEGIN, &mut self.rng),
+            Some(mut tour) => {
+                // A slot of the dwell is over.
+                if self.cell == Some(state.cell)
+                    && let Some(stop) = tour.stops.first_mut().filter(|stop| stop.cell == state.cell)
+                {
+                    stop.slots = stop.slots.saturating_sub(1);
+                }
+                problem.anneal(tour, REFINE, &mut self.rng)
+            }
+        };
+        self.tour = Some(tour);
+        self.cell = Some(state.cell);
+        value
+    }
+}

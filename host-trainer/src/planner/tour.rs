@@ -1,6 +1,7 @@
 //! A plan, and what comes of it in the mean.
 
 use super::known::Known;
+use crate::flight::Flight;
 use gleaner_units::{Action, Cell};
 
 /// What counts as empty, data units: less than a thousandth of a device.
@@ -49,6 +50,18 @@ const fn hovers(action: Action) -> i32 {
 }
 
 impl State {
+    /// Where a flight stands.
+    #[must_use]
+    pub fn of(flight: &Flight) -> State {
+        let episode = flight.episode();
+        let mut remaining = [0.0; DEVICES_MAX];
+        for (remaining, device) in remaining.iter_mut().zip(episode.devices()) {
+            *remaining = device.remaining_units;
+        }
+        let hovers_left = (2.0 * episode.battery().0).floor() as i32;
+        State { cell: episode.uav(), hovers_left, remaining, collected: 0.0, over: flight.is_over() }
+    }
+
     /// Flies one slot: whoever is heard best in the mean sends, then the aircraft hovers or moves.
     pub fn slot(&mut self, known: &Known, action: Action) {
         self.collected += self.serve(known);
