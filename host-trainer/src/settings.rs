@@ -89,6 +89,16 @@ pub struct Settings {
     pub share_varied: f64,
 }
 
+impl Default for Settings {
+    fn default() -> Settings {
+        use clap::{Args as _, FromArgMatches as _};
+        let described = Settings::augment_args(clap::Command::new("settings")).no_binary_name(true);
+        let matches = described.try_get_matches_from::<_, &str>([]);
+        let settings = matches.and_then(|matches| Settings::from_arg_matches(&matches));
+        settings.expect("every setting has a default")
+    }
+}
+
 impl Settings {
     /// The mission with this number: every draw comes from the run's seed and the number.
     ///
