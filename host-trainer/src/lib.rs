@@ -15,10 +15,12 @@
 //! [`export`] writes the model. The network itself is [`net`].
 
 pub mod checkpoint;
+pub mod curves;
 pub mod ddqn;
 pub mod distil;
 pub mod encoding;
 pub mod evaluation;
+pub mod explanation;
 pub mod export;
 pub mod flight;
 pub mod greedy;
@@ -28,9 +30,13 @@ pub mod maps;
 pub mod mosac;
 pub mod net;
 pub mod observation;
+pub mod paper;
 pub mod pareto;
+pub mod parts;
 pub mod planner;
 pub mod replay;
+pub mod report;
+pub mod robustness;
 pub mod settings;
 pub mod system;
 pub mod train;

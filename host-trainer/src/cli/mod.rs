@@ -2,6 +2,8 @@
 
 mod evaluate;
 mod export;
+mod report;
+mod systems;
 mod train;
 
 use anyhow::{Context, Result};
@@ -29,6 +31,9 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
     Export(export::Arguments),
+    /// Make one page with all tables and figures of the paper from models and runs, and the CSV files behind it; goes on
+    /// where it was stopped.
+    Report(report::Arguments),
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -37,6 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Distil(arguments) => train::distil(arguments),
         Command::Evaluate(arguments) => evaluate::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
     }
 }
 
