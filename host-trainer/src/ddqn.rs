@@ -90,9 +90,9 @@ impl<E: Encoding> learner::Learner for Learner<E> {
                 gradients.fill(0.0);
                 for (row, index) in range.enumerate() {
                     let action = transitions[index / settings.preferences].action.index();
-                    for objective in 0..OBJECTIVES {
+                    for (objective, target) in targets[index].iter().enumerate() {
                         let at = row * VALUES + action * OBJECTIVES + objective;
-                        let error = outputs[at] - targets[index][objective];
+                        let error = outputs[at] - target;
                         value += 0.5 * scale * error * error;
                         gradients[at] = scale * error;
                     }

@@ -106,3 +106,56 @@ impl Encoding for FeatureVector {
         (seen.0[1] - seen.0[0]) * schema::BATTERY.scale
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::learner::{Asked, Learner, MosacAtt, MosacCgl, MosacFtv};
+    use gleaner_units::Action;
+    use gleaner_world::{Realization, Scenario, Seed};
+    use rand::SeedableRng;
+    use std::sync::Arc;
+
+    fn flight(devices: usize) -> Flight {
+        let world = Arc::new(World::default_world());
+        let scenario = Scenario::reach_destination().with_devices(devices);
+        let realization = Realization::draw(world.city(), &scenario, Seed::evaluation(1)).unwrap();
+        let mut flight = Flight::new(&world, &realization, Seed::evaluation(1), Preference::DATA).unwrap();
+        flight.step(Action::East);
+        flight
+    }
+
+    #[test]
+    fn a_feature_vector_is_the_numbers_of_the_tokens_and_zeros() {
+        for devices in [0, 6, 12] {
+            let flight = flight(devices);
+            let Features(numbers) = FeatureVector.observe(&flight);
+            assert_eq!(numbers.len(), 4 + 5 * devices);
+            let tokens = crate::observation::normalise(&flight.tokens());
+            assert_eq!(numbers[..4], tokens.uav);
+            assert_eq!(numbers[4..], *tokens.devices_present().as_flattened());
+        }
+    }
+
+    /// Under every encoding 31 moves are left and the answer depends on the preference.
+    fn sees<L: Learner>() {
+        let flight = flight(6);
+        let encoding = L::Encoding::of(flight.episode().world());
+        let seen = encoding.observe(&flight);
+        assert_eq!(L::Encoding::way_to_terminal(&seen), 31.0, "{}", L::SYSTEM);
+        let parameters = L::network().initialise(&mut rand_chacha::ChaCha8Rng::seed_from_u64(1));
+        let mut asked = Asked::<L::Encoding>::new(L::network());
+        let states = [(&seen, Preference::DATA), (&seen, Preference::ENERGY), (&seen, Preference::DATA)];
+        let answers = asked.answer(&encoding, &parameters, states).to_vec();
+        let [data, energy, again] = [0, 1, 2].map(|row| &answers[row * 5..row * 5 + 5]);
+        assert_eq!(data, again, "{}", L::SYSTEM);
+        assert_ne!(data, energy, "{}", L::SYSTEM);
+    }
+
+    #[test]
+    fn every_encoding_sees_the_way_home_and_the_preference() {
+        sees::<MosacAtt>();
+        sees::<MosacCgl>();
+        sees::<MosacFtv>();
+    }
+}

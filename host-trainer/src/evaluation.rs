@@ -5,7 +5,7 @@ use crate::greedy::Greedy;
 use crate::net::{self, Batch, Sample, Shape, Workspace};
 use crate::observation::normalise;
 use crate::pareto::{REFERENCE, hypervolume};
-use gleaner_policy::{Policy, Preference};
+use gleaner_policy::{Attention, Policy, Preference};
 use gleaner_units::Action;
 use gleaner_world::{Realization, Scenario, ScenarioError, Seed, World};
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,15 @@ pub trait Decider {
     /// # Errors
     /// The engine's own.
     fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError>;
+
+    /// Who looks at whom in the second layer before the next action of this flight; `None` for a system without
+    /// attention.
+    ///
+    /// # Errors
+    /// The engine's own.
+    fn attention(&mut self, _flight: &Flight) -> Result<Option<Attention>, DeciderError> {
+        Ok(None)
+    }
 }
 
 /// An engine gave no answer.
@@ -71,6 +80,11 @@ impl Decider for Network<'_> {
             })
             .collect()
     }
+
+    fn attention(&mut self, flight: &Flight) -> Result<Option<Attention>, DeciderError> {
+        self.logits([normalise(&flight.tokens())]);
+        Ok(Some(Attention(self.workspace.attention(0))))
+    }
 }
 
 /// An engine that flies, one decision at a time.
@@ -90,6 +104,11 @@ impl<P: Policy<Error: std::fmt::Display>> Decider for Engine<'_, P> {
             })
             .collect()
     }
+
+    fn attention(&mut self, flight: &Flight) -> Result<Option<Attention>, DeciderError> {
+        let answer = self.0.infer(&flight.tokens()).map_err(|error| DeciderError(error.to_string()))?;
+        Ok(Some(answer.attention))
+    }
 }
 
 /// Mean and spread of one preference over the realizations.
@@ -99,6 +118,9 @@ pub struct Row {
     pub w_data: f32,
     /// Mean percent of the data.
     pub data_percent: f32,
+    /// Standard deviation of the percent of the data.
+    #[serde(default)]
+    pub data_std: f32,
     /// Mean battery units used.
     pub energy: f32,
     /// Standard deviation of the battery units used.
@@ -107,12 +129,9 @@ pub struct Row {
 
 impl Row {
     fn new(w_data: f32, totals: &[Reward]) -> Row {
-        let count = totals.len() as f32;
-        let mean = |objective: usize| totals.iter().map(|total| total[objective]).sum::<f32>() / count;
-        let energy = -mean(1);
-        let variance =
-            totals.iter().map(|total| (-total[1] - energy) * (-total[1] - energy)).sum::<f32>() / count;
-        Row { w_data, data_percent: mean(0), energy, energy_std: variance.max(0.0).sqrt() }
+        let (data_percent, data_std) = mean_and_std(totals.iter().map(|total| total[0]));
+        let (energy, energy_std) = mean_and_std(totals.iter().map(|total| -total[1]));
+        Row { w_data, data_percent, data_std, energy, energy_std }
     }
 
     /// As a point of the front.
@@ -120,30 +139,80 @@ impl Row {
     pub const fn point(&self) -> Reward {
         [self.data_percent, -self.energy]
     }
+
+    /// `w . J` (paper, average utility).
+    #[must_use]
+    pub fn utility(&self) -> f32 {
+        utility(self.w_data, self.point())
+    }
 }
 
-/// One evaluated system in one scenario.
+fn utility(w_data: f32, total: Reward) -> f32 {
+    w_data * total[0] + (1.0 - w_data) * total[1]
+}
+
+/// Mean and population standard deviation, the paper's; zeros for no numbers.
+#[must_use]
+pub fn mean_and_std(numbers: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
+    let count = numbers.clone().count().max(1) as f64;
+    let mean = numbers.clone().map(f64::from).sum::<f64>() / count;
+    let variance = numbers.map(|x| (f64::from(x) - mean) * (f64::from(x) - mean)).sum::<f64>() / count;
+    (mean as f32, variance.sqrt() as f32)
+}
+
+/// What one system brought home in one setting: for each test preference by rising weight of data, the total of every
+/// realization in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Missions(pub Vec<Vec<Reward>>);
+
+impl Missions {
+    /// The paper's metrics of them.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        let rows: Vec<Row> = test_preferences()
+            .iter()
+            .zip(&self.0)
+            .map(|(preference, totals)| Row::new(preference.w_data(), totals))
+            .collect();
+        let points: Vec<Reward> = rows.iter().map(Row::point).collect();
+        Table {
+            hypervolume: hypervolume(&points, REFERENCE),
+            mean_hypervolume: self.mean_hypervolume(),
+            utility: rows.iter().map(Row::utility).sum::<f32>() / rows.len().max(1) as f32,
+            rows,
+        }
+    }
+
+    /// How many realizations were flown.
+    #[must_use]
+    pub fn realizations(&self) -> usize {
+        self.0.first().map_or(0, Vec::len)
+    }
+
+    fn mean_hypervolume(&self) -> f64 {
+        let of_one = |realization: usize| {
+            let points: Vec<Reward> = self.0.iter().map(|totals| totals[realization]).collect();
+            hypervolume(&points, REFERENCE)
+        };
+        (0..self.realizations()).map(of_one).sum::<f64>() / self.realizations().max(1) as f64
+    }
+}
+
+/// The paper's metrics of one system in one setting.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// One row a preference, by rising weight of data.
     pub rows: Vec<Row>,
     /// Hypervolume of the mean front above the paper's reference point.
     pub hypervolume: f64,
+    /// Mean over the realizations of the hypervolume of the eleven missions of one realization.
+    #[serde(default)]
+    pub mean_hypervolume: f64,
     /// Mean over preferences of `w . J` (paper, average utility).
     pub utility: f32,
 }
 
 impl Table {
-    fn new(rows: Vec<Row>) -> Table {
-        let points: Vec<Reward> = rows.iter().map(Row::point).collect();
-        let utility = rows
-            .iter()
-            .map(|row| row.w_data * row.data_percent - (1.0 - row.w_data) * row.energy)
-            .sum::<f32>()
-            / rows.len() as f32;
-        Table { hypervolume: hypervolume(&points, REFERENCE), utility, rows }
-    }
-
     /// Percent of the data at w = (1, 0).
     #[must_use]
     pub fn coverage(&self) -> f32 {
@@ -154,6 +223,12 @@ impl Table {
     #[must_use]
     pub fn least_energy(&self) -> f32 {
         self.rows.first().map_or(0.0, |row| row.energy)
+    }
+
+    /// Standard deviation of the battery units used at w = (0, 1).
+    #[must_use]
+    pub fn least_energy_std(&self) -> f32 {
+        self.rows.first().map_or(0.0, |row| row.energy_std)
     }
 }
 
@@ -174,19 +249,19 @@ pub fn realizations(
         .collect()
 }
 
-/// Flies every realization under every test preference.
+/// Flies every realization under one preference.
 ///
 /// # Errors
 /// The decider failed.
 ///
 /// # Panics
 /// When the realizations belong to another world.
-pub fn evaluate(
+pub fn fly_all(
     world: &Arc<World>,
     realizations: &[(Seed, Realization)],
+    preferences: &[Preference],
     decider: &mut dyn Decider,
-) -> Result<Table, DeciderError> {
-    let preferences = test_preferences();
+) -> Result<Missions, DeciderError> {
     let mut flights: Vec<Flight> = preferences
         .iter()
         .flat_map(|&preference| {
@@ -205,14 +280,23 @@ pub fn evaluate(
             flight.step(action);
         }
     }
-    let rows = preferences
-        .iter()
-        .zip(flights.chunks(realizations.len()))
-        .map(|(preference, flights)| {
-            Row::new(preference.w_data(), &flights.iter().map(Flight::total).collect::<Vec<_>>())
-        })
-        .collect();
-    Ok(Table::new(rows))
+    let totals = |flights: &[Flight]| flights.iter().map(Flight::total).collect();
+    Ok(Missions(flights.chunks(realizations.len().max(1)).map(totals).collect()))
+}
+
+/// Flies every realization under every test preference.
+///
+/// # Errors
+/// The decider failed.
+///
+/// # Panics
+/// When the realizations belong to another world.
+pub fn evaluate(
+    world: &Arc<World>,
+    realizations: &[(Seed, Realization)],
+    decider: &mut dyn Decider,
+) -> Result<Table, DeciderError> {
+    Ok(fly_all(world, realizations, &test_preferences(), decider)?.table())
 }
 
 /// GREEDY on the same realizations: for each preference the number of visits with the best mean utility, as the
@@ -221,38 +305,59 @@ pub fn evaluate(
 /// # Panics
 /// When the realizations belong to another world.
 #[must_use]
-pub fn evaluate_greedy(world: &Arc<World>, realizations: &[(Seed, Realization)]) -> Table {
+pub fn fly_greedy(world: &Arc<World>, realizations: &[(Seed, Realization)]) -> Missions {
     let most_devices = realizations.iter().map(|(_, r)| r.devices().len()).max().unwrap_or(0);
-    let per_visits: Vec<Vec<Reward>> = (0..=most_devices)
-        .map(|visits| {
-            realizations
-                .iter()
-                .map(|(seed, realization)| {
-                    let mut flight = Flight::new(world, realization, *seed, Preference::DATA)
-                        .expect("drawn for this world");
-                    let mut greedy = Greedy::new(visits);
-                    while !flight.is_over() {
-                        flight.step(greedy.decide(&flight));
-                    }
-                    flight.total()
-                })
-                .collect()
-        })
-        .collect();
-    let rows = test_preferences()
-        .iter()
-        .map(|preference| {
-            per_visits
-                .iter()
-                .map(|totals| Row::new(preference.w_data(), totals))
-                .max_by(|a, b| {
-                    let utility = |row: &Row| {
-                        preference.w_data() * row.data_percent - preference.w_energy() * row.energy
-                    };
-                    utility(a).total_cmp(&utility(b))
-                })
-                .expect("at least the parameterisation without visits")
-        })
-        .collect();
-    Table::new(rows)
+    let fly = |visits: usize| -> Vec<Reward> {
+        realizations
+            .iter()
+            .map(|(seed, realization)| {
+                let mut flight =
+                    Flight::new(world, realization, *seed, Preference::DATA).expect("drawn for this world");
+                let mut greedy = Greedy::new(visits);
+                while !flight.is_over() {
+                    flight.step(greedy.decide(&flight));
+                }
+                flight.total()
+            })
+            .collect()
+    };
+    let per_visits: Vec<Vec<Reward>> = (0..=most_devices).map(fly).collect();
+    let best = |preference: &Preference| {
+        let value = |totals: &Vec<Reward>| Row::new(preference.w_data(), totals).utility();
+        let best = per_visits.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
+        best.expect("at least the parameterisation without visits").clone()
+    };
+    Missions(test_preferences().iter().map(best).collect())
+}
+
+/// The table of [`fly_greedy`].
+///
+/// # Panics
+/// When the realizations belong to another world.
+#[must_use]
+pub fn evaluate_greedy(world: &Arc<World>, realizations: &[(Seed, Realization)]) -> Table {
+    fly_greedy(world, realizations).table()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_what_the_paper_defines() {
+        // Two realizations; the first six preferences bring (10, -2) and (30, -4), the others (50, -40) and (70, -60).
+        let low = vec![[10.0, -2.0], [30.0, -4.0]];
+        let high = vec![[50.0, -40.0], [70.0, -60.0]];
+        let table =
+            Missions((0..11).map(|i| if i < 6 { low.clone() } else { high.clone() }).collect()).table();
+        assert_eq!((table.coverage(), table.least_energy(), table.least_energy_std()), (60.0, 3.0, 1.0));
+        assert_eq!((table.rows[10].data_std, table.rows[10].energy), (10.0, 50.0));
+        // Mean points (20, -3) and (60, -50) above (-1, -200).
+        assert!((table.hypervolume - (61.0 * 150.0 + 21.0 * 47.0)).abs() < 1e-3, "{}", table.hypervolume);
+        let of_each = [51.0 * 160.0 + 11.0 * 38.0, 71.0 * 140.0 + 31.0 * 56.0];
+        assert!((table.mean_hypervolume - (of_each[0] + of_each[1]) / 2.0).abs() < 1e-3);
+        // Sum of w over the two halves: 1.5 and 4.0; of 1 - w: 4.5 and 1.0.
+        let utility = (1.5 * 20.0 - 4.5 * 3.0 + 4.0 * 60.0 - 1.0 * 50.0) / 11.0;
+        assert!((table.utility - utility).abs() < 1e-4, "{} {utility}", table.utility);
+    }
 }

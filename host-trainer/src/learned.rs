@@ -178,3 +178,58 @@ impl<L: Learner> Decider for Trained<'_, L> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::{evaluate, realizations};
+    use gleaner_world::Scenario;
+
+    fn learned(system: System) -> Learned {
+        Learned {
+            system,
+            method: "train".into(),
+            settings: Settings::default(),
+            actor: vec![0.01; system.parameter_count()],
+            update: 7,
+            steps: 28,
+            score: 1.5,
+        }
+    }
+
+    #[test]
+    fn what_was_learned_comes_back_and_flies() {
+        let world = Arc::new(World::default_world());
+        let drawn = realizations(&world, &Scenario::reach_destination().with_devices(12), 1).unwrap();
+        for system in System::ALL {
+            let folder = tempfile::tempdir().unwrap();
+            learned(system).save(folder.path()).unwrap();
+            let back = Learned::load_of(system, folder.path()).unwrap().unwrap();
+            assert_eq!((back.system, &back.actor), (system, &learned(system).actor));
+            let table = evaluate(&world, &drawn, &mut *back.decider()).unwrap();
+            assert!(table.rows.iter().all(|row| row.energy >= 32.0 && row.energy <= 80.0), "{system}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_a_system_is_mosac_att() {
+        let folder = tempfile::tempdir().unwrap();
+        checkpoint::save(&folder.path().join(LEARNED), &learned(System::MosacAtt)).unwrap();
+        let back = Learned::load(folder.path()).unwrap().unwrap();
+        assert_eq!((back.system, back.method.as_str(), back.update), (System::MosacAtt, "train", 7));
+    }
+
+    #[test]
+    fn parameters_of_another_network_or_system_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        learned(System::MosacCgl).save(folder.path()).unwrap();
+        let error = Learned::load_of(System::MosacAtt, folder.path()).unwrap_err();
+        assert!(matches!(error, LearnedError::OtherSystem { found: System::MosacCgl, .. }), "{error}");
+        let mut older = learned(System::MosacFtv);
+        older.actor.pop();
+        older.save(folder.path()).unwrap();
+        let error = Learned::load(folder.path()).unwrap_err();
+        assert!(matches!(error, LearnedError::OtherNetwork { found: 84_228, .. }), "{error}");
+        assert!(!error.to_string().contains('\n'), "one line");
+    }
+}

@@ -19,10 +19,12 @@
 //! best tour that the [`planner`] finds for someone who knows everything.
 
 pub mod checkpoint;
+pub mod curves;
 pub mod ddqn;
 pub mod distil;
 pub mod encoding;
 pub mod evaluation;
+pub mod explanation;
 pub mod export;
 pub mod flight;
 pub mod greedy;
@@ -33,10 +35,14 @@ pub mod mosac;
 pub mod net;
 pub mod observation;
 pub mod oracle;
+pub mod paper;
 pub mod pareto;
+pub mod parts;
 pub mod planner;
 pub mod refine;
 pub mod replay;
+pub mod report;
+pub mod robustness;
 pub mod settings;
 pub mod system;
 pub mod teacher;

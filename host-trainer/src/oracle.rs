@@ -1,7 +1,7 @@
 //! The oracle: what a planner that knows map, channel and devices plans for. A strong lower bound of the optimum, not
 //! the optimum.
 
-use crate::evaluation::test_preferences;
+use crate::evaluation::{Missions, test_preferences};
 use crate::flight::Reward;
 use crate::planner::{DEVICES_MAX, Effort, Problem, Rates, State, Tour};
 use gleaner_world::Realization;
@@ -23,8 +23,12 @@ pub struct OracleSetting {
     pub battery: u16,
     /// Realizations 0 to N - 1.
     pub realizations: u64,
-    /// For each test preference and each realization, what the best tour brings in the mean.
-    pub missions: Vec<Vec<Reward>>,
+    /// What the best tours bring in the mean.
+    pub missions: Missions,
+    /// Percent of the data at w = (1, 0) that nobody can exceed, for the first realizations; empty when it was not
+    /// computed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub upper_bound_percent: Vec<f32>,
 }
 
 /// How hard to look for the best tour of a mission under one preference: two searches, one of them from the best

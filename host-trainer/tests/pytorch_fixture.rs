@@ -1,19 +1,24 @@
-//! The network against PyTorch: outputs, attention, losses, gradients and parameters after three steps of Adam.
+//! The networks against PyTorch: outputs, attention, losses, gradients and parameters after three steps of Adam.
 //!
-//! The frozen numbers come from `scripts/pytorch_fixture.py`, which says how to make them anew. Parameters and
-//! inputs are drawn here by the same generator.
+//! The frozen numbers come from `scripts/pytorch_fixture.py` and, for the networks that the paper compares with,
+//! `scripts/pytorch_fixture_baselines.py`, which say how to make them anew. Parameters and inputs are drawn here by
+//! the same generator.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
 use gleaner_host_trainer::net::{Adam, Batch, DEVICE_FEATURES, Shape, TOKENS_MAX, Workspace};
-use gleaner_host_trainer::net::{backward, forward};
+use gleaner_host_trainer::net::{Architecture, MapBatch, MapShape, VectorBatch, VectorShape};
+use gleaner_host_trainer::net::{GLOBAL_NUMBERS, LOCAL_NUMBERS, VECTOR_FEATURES, backward, forward};
 
 #[derive(serde::Deserialize)]
 struct Manifest {
     seed: String,
+    #[serde(default)]
     device_counts: Vec<usize>,
+    #[serde(default)]
+    copies: Vec<usize>,
     steps: usize,
     learning_rate: f32,
     stride: usize,
@@ -26,10 +31,10 @@ struct Fixture {
 }
 
 impl Fixture {
-    fn read() -> Self {
+    fn read(name: &str) -> Self {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
-        let manifest = std::fs::read_to_string(folder.join("pytorch.json")).unwrap();
-        let bytes = std::fs::read(folder.join("pytorch.f32")).unwrap();
+        let manifest = std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap();
+        let bytes = std::fs::read(folder.join(format!("{name}.f32"))).unwrap();
         let number = |four: &[u8]| f32::from_le_bytes(four.try_into().unwrap());
         Self {
             manifest: serde_json::from_str(&manifest).unwrap(),
@@ -109,7 +114,7 @@ fn key_biases(shape: Shape) -> Vec<Range<usize>> {
 }
 
 fn agrees_with_pytorch(network: &str, shape: Shape) {
-    let fixture = Fixture::read();
+    let fixture = Fixture::read("pytorch");
     let manifest = &fixture.manifest;
     let mut generator = Generator(manifest.seed.parse().unwrap());
     let mut parameters = generator.parameters(shape);
@@ -161,4 +166,104 @@ fn actor_agrees_with_pytorch() {
 #[test]
 fn critic_agrees_with_pytorch() {
     agrees_with_pytorch("critic", Shape::critic());
+}
+
+/// `draw` packs the states; the preferences and the targets are drawn after them.
+fn baseline_agrees_with_pytorch<N: Architecture>(
+    name: &str,
+    network: N,
+    draw: impl Fn(&mut Generator, &[usize]) -> N::Batch,
+) {
+    let fixture = Fixture::read("pytorch_baselines");
+    let manifest = &fixture.manifest;
+    let mut generator = Generator(manifest.seed.parse().unwrap());
+    let mut parameters = Vec::new();
+    let mut inputs = 1.0;
+    for tensor in network.tensors() {
+        if tensor.name.ends_with("weight") {
+            inputs = f64::from(tensor.cols as u32).sqrt();
+        }
+        let drawn = generator.numbers(tensor.len());
+        parameters.extend(drawn.into_iter().map(|number| (f64::from(number) / inputs) as f32));
+    }
+    let batch = draw(&mut generator, &manifest.copies);
+    let outputs = network.outputs();
+    let targets = generator.numbers(manifest.copies.iter().sum::<usize>() * outputs);
+    let strided = |all: &[f32]| all.iter().copied().step_by(manifest.stride).collect::<Vec<_>>();
+
+    let mut workspace = N::Workspace::default();
+    let mut adam = Adam::new(parameters.len(), manifest.learning_rate);
+    let scale = 1.0 / targets.len() as f32;
+    let mut losses = Vec::new();
+    for step in 0..manifest.steps {
+        let mut gradients = vec![0.0; parameters.len()];
+        let mut loss = 0.0;
+        let squares = |samples: Range<usize>, found: &[f32], d: &mut [f32]| {
+            for ((d, found), target) in d.iter_mut().zip(found).zip(&targets[samples.start * outputs..]) {
+                loss += scale * (found - target).powi(2);
+                *d = 2.0 * scale * (found - target);
+            }
+        };
+        let found = network.forward_backward(&parameters, &batch, &mut workspace, squares, &mut gradients);
+        if step == 0 {
+            assert_close("outputs", found, fixture.section(name, "outputs"), 5e-6);
+            let found = found.to_vec();
+            assert_eq!(
+                network.forward(&parameters, &batch, &mut workspace),
+                found,
+                "both ways the same bits"
+            );
+            let square = |g: &f32| f64::from(*g).powi(2);
+            let norm = |part: &[f32]| part.iter().map(square).sum::<f64>().sqrt() as f32;
+            let norms: Vec<f32> = network.tensors().iter().map(|t| norm(t.of(&gradients))).collect();
+            assert_close("norms", &norms, fixture.section(name, "gradient_norms"), 2e-6);
+            assert_close("gradients", &strided(&gradients), fixture.section(name, "gradients"), 5e-7);
+        }
+        losses.push(loss);
+        adam.step(&mut parameters, &gradients);
+    }
+    assert_close("losses", &losses, fixture.section(name, "losses"), 1e-6);
+    let torch = fixture.section(name, "parameters_after");
+    assert_close("parameters after", &strided(&parameters), torch, 2e-5);
+}
+
+/// So many preferences for each state, drawn for all states together.
+fn preferences(generator: &mut Generator, copies: &[usize]) -> Vec<Vec<[f32; 2]>> {
+    let all = generator.numbers(2 * copies.iter().sum::<usize>());
+    let mut rest = all.as_chunks::<2>().0;
+    let mut next = |&count: &usize| {
+        let (own, others) = rest.split_at(count);
+        rest = others;
+        own.to_vec()
+    };
+    copies.iter().map(&mut next).collect()
+}
+
+#[test]
+fn maps_agree_with_pytorch() {
+    baseline_agrees_with_pytorch("maps", MapShape { outputs: 10 }, |generator, copies| {
+        let local = generator.numbers(copies.len() * LOCAL_NUMBERS);
+        let global = generator.numbers(copies.len() * GLOBAL_NUMBERS);
+        let battery = generator.numbers(copies.len());
+        let mut batch = MapBatch::default();
+        for (state, preferences) in preferences(generator, copies).iter().enumerate() {
+            let (own_local, own_global) = batch.push(battery[state], preferences);
+            own_local.copy_from_slice(&local[state * LOCAL_NUMBERS..][..LOCAL_NUMBERS]);
+            own_global.copy_from_slice(&global[state * GLOBAL_NUMBERS..][..GLOBAL_NUMBERS]);
+        }
+        batch
+    });
+}
+
+#[test]
+fn vectors_agree_with_pytorch() {
+    baseline_agrees_with_pytorch("vector", VectorShape { outputs: 5 }, |generator, copies| {
+        let states = generator.numbers(copies.len() * VECTOR_FEATURES);
+        let mut batch = VectorBatch::default();
+        let states = states.as_chunks().0.iter();
+        for (state, preferences) in states.zip(preferences(generator, copies)) {
+            batch.push(state, &preferences);
+        }
+        batch
+    });
 }

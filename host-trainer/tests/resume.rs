@@ -1,8 +1,9 @@
 //! A killed run goes on exactly where its last checkpoint was.
 
 use clap::Parser;
-use gleaner_host_trainer::learner::MosacAtt;
+use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::{CHECKPOINT, Run, TrainError};
 use std::fs;
 
@@ -18,16 +19,15 @@ fn settings(more: &[&str]) -> Settings {
     Command::parse_from(usual.iter().chain(&shares).chain(more)).settings
 }
 
-#[test]
-fn resuming_gives_the_same_bits_as_never_having_stopped() {
+fn resumes<L: Learner>() {
     let (through, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let mut run = Run::<MosacAtt>::open(settings(&[]), through.path()).unwrap();
+    let mut run = Run::<L>::open(settings(&[]), through.path()).unwrap();
     while !run.is_done() {
         run.advance().unwrap();
     }
     run.save(through.path()).unwrap();
 
-    let mut run = Run::<MosacAtt>::open(settings(&[]), stopped.path()).unwrap();
+    let mut run = Run::<L>::open(settings(&[]), stopped.path()).unwrap();
     for _ in 0..23 {
         run.advance().unwrap();
     }
@@ -36,7 +36,7 @@ fn resuming_gives_the_same_bits_as_never_having_stopped() {
         run.advance().unwrap(); // lost in the kill
     }
     drop(run);
-    let mut run = Run::<MosacAtt>::open(settings(&[]), stopped.path()).unwrap();
+    let mut run = Run::<L>::open(settings(&[]), stopped.path()).unwrap();
     assert_eq!(run.update(), 23);
     while !run.is_done() {
         run.advance().unwrap();
@@ -44,7 +44,24 @@ fn resuming_gives_the_same_bits_as_never_having_stopped() {
     run.save(stopped.path()).unwrap();
 
     let read = |folder: &tempfile::TempDir| fs::read(folder.path().join(CHECKPOINT)).unwrap();
-    assert!(read(&through) == read(&stopped), "the two runs differ");
+    assert!(read(&through) == read(&stopped), "{}: the two runs differ", L::SYSTEM);
+}
+
+#[test]
+fn resuming_gives_the_same_bits_as_never_having_stopped() {
+    resumes::<MosacAtt>();
+    resumes::<MosacCgl>();
+    resumes::<DdqnCgl>();
+    resumes::<MosacFtv>();
+}
+
+#[test]
+fn a_folder_with_a_run_of_another_system_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    Run::<DdqnCgl>::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
+    let error = Run::<MosacCgl>::open(settings(&[]), folder.path()).err().unwrap();
+    assert!(matches!(error, TrainError::OtherSystem { found: System::DdqnCgl, .. }), "{error}");
+    assert!(error.to_string().contains("--system ddqn-cgl"), "{error}");
 }
 
 #[test]
@@ -59,14 +76,48 @@ fn a_folder_with_another_run_is_refused_and_a_longer_run_is_not() {
     assert!(Run::<MosacAtt>::open(longer, folder.path()).is_ok());
 }
 
-#[test]
-fn a_damaged_checkpoint_is_refused_and_kept() {
+fn notices_damage<L: Learner>() {
     let folder = tempfile::tempdir().unwrap();
-    Run::<MosacAtt>::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
+    Run::<L>::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
     let path = folder.path().join(CHECKPOINT);
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
-    let error = Run::<MosacAtt>::open(settings(&[]), folder.path()).err().unwrap().to_string();
+    let error = Run::<L>::open(settings(&[]), folder.path()).err().unwrap().to_string();
     assert!(error.contains("damaged"), "{error}");
     assert_eq!(fs::read(&path).unwrap().len(), whole.len() / 2, "the evidence is untouched");
+}
+
+#[test]
+fn a_damaged_checkpoint_is_refused_and_kept() {
+    notices_damage::<MosacAtt>();
+    notices_damage::<MosacCgl>();
+    notices_damage::<DdqnCgl>();
+    notices_damage::<MosacFtv>();
+}
+
+#[cfg(target_os = "linux")]
+fn survives_a_full_disk<L: Learner>() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = Run::<L>::open(settings(&[]), folder.path()).unwrap();
+    run.save(folder.path()).unwrap();
+    let path = folder.path().join(CHECKPOINT);
+    let good = fs::read(&path).unwrap();
+    run.advance().unwrap();
+    // What cannot be written through stands for a full disk: every byte sent there is refused for want of space.
+    std::os::unix::fs::symlink("/dev/full", path.with_extension("writing")).unwrap();
+    let error = run.save(folder.path()).err().unwrap().to_string();
+    assert!(error.contains("No space left on device"), "{error}");
+    assert!(fs::read(&path).unwrap() == good, "the last good checkpoint is untouched");
+    // With room again, the run goes on as if nothing had happened.
+    run.save(folder.path()).unwrap();
+    assert!(fs::read(&path).unwrap() != good);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_said_and_never_destroys_the_last_good_checkpoint() {
+    survives_a_full_disk::<MosacAtt>();
+    survives_a_full_disk::<MosacCgl>();
+    survives_a_full_disk::<DdqnCgl>();
+    survives_a_full_disk::<MosacFtv>();
 }

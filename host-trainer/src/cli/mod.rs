@@ -3,6 +3,8 @@
 mod evaluate;
 mod export;
 mod oracle;
+mod report;
+mod systems;
 mod train;
 
 use anyhow::{Context, Result};
@@ -34,6 +36,9 @@ enum Command {
     Oracle(oracle::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
     Export(export::Arguments),
+    /// Make one page with all tables and figures of the paper from models and runs, and the CSV files behind it; goes on
+    /// where it was stopped.
+    Report(report::Arguments),
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -44,6 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Evaluate(arguments) => evaluate::run(arguments),
         Command::Oracle(arguments) => oracle::run(arguments),
         Command::Export(arguments) => export::run(arguments),
+        Command::Report(arguments) => report::run(arguments),
     }
 }
 

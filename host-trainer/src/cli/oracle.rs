@@ -1,7 +1,7 @@
 //! `gleaner-train oracle`.
 
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{realizations, test_preferences};
+use gleaner_host_trainer::evaluation::{Missions, realizations, test_preferences};
 use gleaner_host_trainer::oracle::{OracleSetting, Thoroughness, consult};
 use gleaner_host_trainer::planner::Rates;
 use gleaner_units::BatteryUnits;
@@ -54,13 +54,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
                 devices,
                 battery,
                 realizations: arguments.realizations,
-                missions: vec![Vec::new(); test_preferences().len()],
+                missions: Missions(vec![Vec::new(); test_preferences().len()]),
+                upper_bound_percent: Vec::new(),
             };
             let bar = bar(arguments.realizations, format!("{kind} K={devices} B={battery}"));
             for (_, realization) in realizations(&world, &scenario, arguments.realizations)? {
                 let thoroughness = Thoroughness { tours: arguments.tours };
                 let rewards = consult(&rates, &realization, thoroughness);
-                for (list, reward) in setting.missions.iter_mut().zip(rewards) {
+                for (list, reward) in setting.missions.0.iter_mut().zip(rewards) {
                     list.push(reward);
                 }
                 bar.inc(1);
@@ -93,15 +94,15 @@ fn summary(setting: &OracleSetting) -> String {
         let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + value));
         sum / count.max(1) as f32
     };
-    let data = |index: usize| mean(&mut setting.missions[index].iter().map(|reward| reward[0]));
-    let energy = |index: usize| -mean(&mut setting.missions[index].iter().map(|reward| reward[1]));
+    let data = |index: usize| mean(&mut setting.missions.0[index].iter().map(|reward| reward[0]));
+    let energy = |index: usize| -mean(&mut setting.missions.0[index].iter().map(|reward| reward[1]));
     format!(
         "{} K={} B={}: {:.1} % of the data for {:.1} units; least energy {:.2}",
         setting.scenario,
         setting.devices,
         setting.battery,
-        data(setting.missions.len() - 1),
-        energy(setting.missions.len() - 1),
+        data(setting.missions.0.len() - 1),
+        energy(setting.missions.0.len() - 1),
         energy(0),
     )
 }

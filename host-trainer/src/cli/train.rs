@@ -1,7 +1,7 @@
 //! `gleaner-train train` and `gleaner-train distil`.
 
 use super::learned_of;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::refine::Refinement;
@@ -158,6 +158,10 @@ struct Desk<'a> {
 
 impl<'a> Desk<'a> {
     fn open(system: System, arguments: &'a Arguments) -> Result<Desk<'a>> {
+        let Settings { batch, preferences, steps_per_update, replay, .. } = arguments.settings;
+        if [batch, preferences, steps_per_update, replay].contains(&0) {
+            bail!("--batch, --preferences, --steps-per-update and --replay must be at least 1");
+        }
         let out = &arguments.out;
         fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         let path = out.join(CURVE);
@@ -173,11 +177,11 @@ impl<'a> Desk<'a> {
     }
 
     fn validation_is_due(&self, update: u64) -> bool {
-        update % self.arguments.validate_every == 0 || update == self.arguments.settings.updates
+        update.is_multiple_of(self.arguments.validate_every) || update == self.arguments.settings.updates
     }
 
     fn checkpoint_is_due(&self, update: u64) -> bool {
-        update % self.arguments.checkpoint_every == 0 || update == self.arguments.settings.updates
+        update.is_multiple_of(self.arguments.checkpoint_every) || update == self.arguments.settings.updates
     }
 
     /// One line of the curve and one for people, whether or not anyone watches the bar; keeps the best.

@@ -159,17 +159,39 @@ fn add_transposed_product_body<const FUSED: bool>(a: &[f32], a_columns: usize, b
     let columns = b.columns;
     for (first, panel) in (0..columns).step_by(LANES).zip(b.numbers.chunks_exact(b.rows * LANES)) {
         let width = LANES.min(columns - first);
-        let full = a_columns - a_columns % TILE;
-        for (at, c) in (0..full).step_by(TILE).zip(c.chunks_exact_mut(TILE * columns)) {
-            let sums = tile_of_transpose::<FUSED, TILE>(a, a_columns, at, panel);
-            for (value, c) in sums.into_iter().zip(c.chunks_exact_mut(columns)) {
-                finish(value, Then::Add, &mut c[first..first + width]);
-            }
+        let mut at = 0;
+        for c in c[..a_columns / TILE * TILE * columns].chunks_exact_mut(TILE * columns) {
+            add_tile::<FUSED, TILE>(a, a_columns, at, panel, (first, width), columns, c);
+            at += TILE;
         }
-        for (at, c) in (full..a_columns).zip(c[full * columns..].chunks_exact_mut(columns)) {
-            let [value] = tile_of_transpose::<FUSED, 1>(a, a_columns, at, panel);
-            finish(value, Then::Add, &mut c[first..first + width]);
+        // What is left over in as few tiles as can be: a single row waits for its own sums.
+        let mut c = &mut c[at * columns..];
+        if a_columns - at >= 4 {
+            add_tile::<FUSED, 4>(a, a_columns, at, panel, (first, width), columns, &mut c[..4 * columns]);
+            c = &mut c[4 * columns..];
+            at += 4;
         }
+        for c in c.chunks_exact_mut(columns) {
+            add_tile::<FUSED, 1>(a, a_columns, at, panel, (first, width), columns, c);
+            at += 1;
+        }
+    }
+}
+
+/// Adds `ROWS` rows of the transposed product, from row `at` on, to the columns of one panel.
+#[inline(always)]
+fn add_tile<const FUSED: bool, const ROWS: usize>(
+    a: &[f32],
+    a_columns: usize,
+    at: usize,
+    panel: &[f32],
+    (first, width): (usize, usize),
+    columns: usize,
+    c: &mut [f32],
+) {
+    let sums = tile_of_transpose::<FUSED, ROWS>(a, a_columns, at, panel);
+    for (value, c) in sums.into_iter().zip(c.chunks_exact_mut(columns)) {
+        finish(value, Then::Add, &mut c[first..first + width]);
     }
 }
 

@@ -65,7 +65,7 @@ pub use maps::{
     MapWorkspace,
 };
 pub use optimiser::{Adam, polyak};
-pub use passes::{backward, forward, forward_backward};
+pub use passes::{answer, backward, forward, forward_backward};
 pub use shape::{
     DEVICE_FEATURES, DEVICES_MAX, FIXED_TOKENS, HEAD_WIDTH, HEADS, LAYER_NORM_EPSILON, LAYERS, MAP_CELLS,
     PREFERENCE_FEATURES, Shape, TOKENS_MAX, Tensor, UAV_FEATURES, WIDTH,

@@ -37,6 +37,28 @@ pub fn forward<'a>(
     &workspace.outputs
 }
 
+/// The outputs of [`forward`], to the last bit, without keeping what [`backward`] needs: one chunk's memory serves all,
+/// so that large batches stay in the cache. After it, [`Workspace::attention`] knows the last chunk only.
+pub fn answer<'a>(
+    shape: &Shape,
+    parameters: &[f32],
+    batch: &Batch,
+    workspace: &'a mut Workspace,
+) -> &'a [f32] {
+    let layout = layout_for(shape, parameters);
+    workspace.chunks.resize_with(workspace.chunks.len().max(1), Activations::default);
+    workspace.outputs.resize(batch.len() * shape.outputs, 0.0);
+    workspace.forward_weights.cut_forward(layout.linears(), parameters);
+    let net = Net { layout: &layout, parameters, weights: &workspace.forward_weights };
+    let chunk = &mut workspace.chunks[0];
+    for (index, outputs) in workspace.outputs.chunks_mut(CHUNK * shape.outputs).enumerate() {
+        let first = index * CHUNK;
+        chunk.prepare(*shape, batch, first..batch.len().min(first + CHUNK));
+        forward_chunk(net, batch, chunk, outputs);
+    }
+    &workspace.outputs
+}
+
 /// Adds to `gradients` the gradient of a loss whose gradient by the outputs is `d_outputs`.
 ///
 /// `workspace` must come from [`forward`] with the same shape, parameters and batch.

@@ -1,0 +1,329 @@
+//! `gleaner-train report`.
+
+use super::systems::System;
+use anyhow::{Context, Result, bail};
+use gleaner_host_trainer::curves;
+use gleaner_host_trainer::evaluation::{fly_all, fly_greedy, realizations, test_preferences};
+use gleaner_host_trainer::explanation::{track, watch};
+use gleaner_host_trainer::paper::Setting;
+use gleaner_host_trainer::parts::{Parts, Source};
+use gleaner_host_trainer::report::{self, Detail, OracleSetting, Report};
+use gleaner_host_trainer::robustness::{repeat_flights, world_with};
+use gleaner_policy::Preference;
+use gleaner_world::{Fading, Realization, ScenarioKind, Seed, World};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::fs;
+use std::io::{BufRead, BufReader, IsTerminal};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The model that is reported on when none is named.
+const SHIPPED: &str = "models/gleaner.onnx";
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// An ONNX model, flown by the engine that flies it on board; NAME=FILE gives it a name. Repeatable. The first
+    /// system of all is looked at more closely: fading, attention, trajectories.
+    #[arg(long, value_name = "[NAME=]FILE")]
+    model: Vec<String>,
+    /// The folder of a run: its best parameters, flown by the learner's network, and its learning curve; NAME=FOLDER
+    /// gives it a name. Repeatable.
+    #[arg(long, value_name = "[NAME=]FOLDER")]
+    run: Vec<String>,
+    /// The folder of a run of which only the learning curve is shown, such as the one that made a model. Repeatable.
+    #[arg(long, value_name = "[NAME=]FOLDER")]
+    curve: Vec<String>,
+    /// What `gleaner-train oracle` wrote: the oracle and the bound for every table.
+    #[arg(long, value_name = "FILE")]
+    oracle: Option<PathBuf>,
+    /// Folder of the page, the CSV files and the finished parts.
+    #[arg(long, default_value = "target/report")]
+    out: PathBuf,
+    /// Evaluation realizations per setting, numbers 0 to N - 1.
+    #[arg(long, default_value_t = 100)]
+    realizations: u64,
+    /// Repeats of the fading test.
+    #[arg(long, default_value_t = 30)]
+    fading_repeats: u32,
+    /// Evaluation realization that is drawn as an example.
+    #[arg(long, default_value_t = 0)]
+    example: u64,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if arguments.realizations == 0 {
+        bail!("--realizations 0: nothing to fly; give at least 1");
+    }
+    let mut systems = named_systems(arguments)?;
+    let oracle = arguments.oracle.as_deref().map(read_oracle).transpose()?.unwrap_or_default();
+    let curves = named_curves(arguments)?;
+    let desk = Desk::open(arguments, systems.len())?;
+    let mut shown = vec![desk.greedy()?];
+    for system in &mut systems {
+        shown.push(desk.evaluate(system)?);
+    }
+    let detail = systems.first_mut().map(|system| desk.look_closer(system)).transpose()?;
+    desk.bar.finish_and_clear();
+    let world = &desk.world;
+    let report = Report {
+        command: command_line(),
+        machine: machine(),
+        realizations: arguments.realizations,
+        heights: world.city().heights().clone(),
+        city_hash: world.city().fingerprint(),
+        systems: shown,
+        oracle,
+        detail,
+        curves,
+    };
+    for (name, text) in report::files(&report) {
+        write_whole(&arguments.out.join(name), text.as_bytes())?;
+    }
+    let page = arguments.out.join("report.html");
+    write_whole(&page, report::page(&report).as_bytes())?;
+    println!("wrote {}, and the CSV files beside it", page.display());
+    Ok(())
+}
+
+/// What measures and tells.
+struct Desk<'a> {
+    arguments: &'a Arguments,
+    world: Arc<World>,
+    parts: Parts,
+    bar: ProgressBar,
+}
+
+impl<'a> Desk<'a> {
+    fn open(arguments: &'a Arguments, systems: usize) -> Result<Desk<'a>> {
+        let parts = Parts::open(&arguments.out.join("parts"))?;
+        let closer = if systems == 0 { 0 } else { 4 + 2 + 2 };
+        let bar = ProgressBar::new((Setting::ALL.len() * (systems + 1) + systems + closer) as u64);
+        let style = ProgressStyle::with_template("{bar:30} {pos}/{len} parts, {elapsed}, now {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Ok(Desk { arguments, world: Arc::new(World::default_world()), parts, bar })
+    }
+
+    /// One part: from the folder if it is there, and told in any case.
+    fn part<T: Serialize + DeserializeOwned>(
+        &self,
+        system: &str,
+        identity: &str,
+        what: &str,
+        measure: impl FnOnce() -> Result<T>,
+    ) -> Result<T> {
+        self.bar.set_message(format!("{system}: {what}"));
+        let city = self.world.city().fingerprint();
+        let count = self.arguments.realizations;
+        let facts = format!("{identity}, {what}, {count} realizations, city {city:016x}");
+        let (part, source) = self.parts.part(&facts, measure)?;
+        self.bar.inc(1);
+        match source {
+            Source::Repaired => self.tell(&format!("{system}: {what}: damaged part, measured again")),
+            Source::Measured if !std::io::stderr().is_terminal() => {
+                self.tell(&format!("{system}: {what}: done"));
+            }
+            Source::Measured | Source::Kept => {}
+        }
+        Ok(part)
+    }
+
+    fn tell(&self, line: &str) {
+        self.bar.suspend(|| eprintln!("{line}"));
+    }
+
+    fn draw(&self, setting: Setting) -> Result<Vec<(Seed, Realization)>> {
+        Ok(realizations(&self.world, &setting.scenario(), self.arguments.realizations)?)
+    }
+
+    fn greedy(&self) -> Result<report::System> {
+        let missions = Setting::ALL
+            .iter()
+            .map(|&setting| {
+                self.part("GREEDY", "greedy", &name(setting), || {
+                    Ok(fly_greedy(&self.world, &self.draw(setting)?))
+                })
+            })
+            .collect::<Result<_>>()?;
+        Ok(report::System {
+            name: "GREEDY".into(),
+            origin:
+                "nearest device first; for each preference the number of visits with the best mean utility"
+                    .into(),
+            parameters: None,
+            latency: None,
+            missions,
+        })
+    }
+
+    fn evaluate(&self, system: &mut System) -> Result<report::System> {
+        let identity = system.identity.clone();
+        let missions = Setting::ALL
+            .iter()
+            .map(|&setting| {
+                self.part(&system.name, &identity, &name(setting), || {
+                    let drawn = self.draw(setting)?;
+                    let preferences = test_preferences();
+                    Ok(fly_all(&self.world, &drawn, &preferences, system.engine.decider().as_mut())?)
+                })
+            })
+            .collect::<Result<_>>()?;
+        let facts = format!("{identity}, {}", machine());
+        let latency =
+            self.part(&system.name, &facts, "inference time", || system.engine.latency(&self.world))?;
+        Ok(report::System {
+            name: system.name.clone(),
+            origin: system.origin.clone(),
+            parameters: Some(system.engine.parameters()),
+            latency: Some(latency),
+            missions,
+        })
+    }
+
+    /// What only the first learned system is put through: the paper does it with MOSAC-ATT alone.
+    fn look_closer(&self, system: &mut System) -> Result<Detail> {
+        let (name, identity) = (system.name.clone(), system.identity.clone());
+        let mut detail = Detail {
+            system: name.clone(),
+            fading: Vec::new(),
+            gazes: Vec::new(),
+            tracks: Vec::new(),
+            example: self.arguments.example,
+        };
+        let repeats = self.arguments.fading_repeats;
+        for kind in ScenarioKind::ALL {
+            let drawn = self.draw(Setting::trained(kind))?;
+            let mut fly = |what: &str, fading| {
+                let what = format!("{what} channel, {repeats} repeats, {kind}");
+                self.part(&name, &identity, &what, || {
+                    let world = world_with(self.world.city().clone(), fading);
+                    Ok(repeat_flights(&world, &drawn, repeats, system.engine.decider().as_mut())?)
+                })
+            };
+            detail.fading.push((kind, fly("regular", Fading::None)?, fly("fading", Fading::Rayleigh)?));
+        }
+        let example = self.example(ScenarioKind::ReachDestination)?;
+        for preference in [Preference::DATA, Preference::ENERGY] {
+            let what = format!("attention, example {}, w = {}", self.arguments.example, preference.w_data());
+            let gaze = self.part(&name, &identity, &what, || {
+                let mut drawn = self.draw(Setting::trained(ScenarioKind::ReachDestination))?;
+                let place = drawn.iter().position(|(seed, _)| seed.number() == self.arguments.example);
+                let place = place.unwrap_or_else(|| {
+                    drawn.push(example.clone());
+                    drawn.len() - 1
+                });
+                Ok(watch(&self.world, &drawn, place, preference, system.engine.decider().as_mut())?)
+            })?;
+            detail.gazes.extend(gaze);
+        }
+        for kind in ScenarioKind::ALL {
+            let example = self.example(kind)?;
+            let what = format!("trajectories, example {}, {kind}", self.arguments.example);
+            let tracks = self.part(&name, &identity, &what, || {
+                let preferences = [1.0, 0.5, 0.0].into_iter().filter_map(Preference::new);
+                preferences
+                    .map(|preference| {
+                        Ok(track(&self.world, &example, preference, system.engine.decider().as_mut())?)
+                    })
+                    .collect()
+            })?;
+            detail.tracks.push((kind, tracks));
+        }
+        Ok(detail)
+    }
+
+    fn example(&self, kind: ScenarioKind) -> Result<(Seed, Realization)> {
+        let seed = Seed::evaluation(self.arguments.example);
+        Ok((seed, Realization::draw(self.world.city(), &kind.scenario(), seed)?))
+    }
+}
+
+fn name(setting: Setting) -> String {
+    format!("{}, K = {}, B = {}", setting.scenario_name(), setting.devices, setting.battery)
+}
+
+/// The systems that the arguments name, with a name each.
+fn named_systems(arguments: &Arguments) -> Result<Vec<System>> {
+    let shipped = [SHIPPED.to_owned()];
+    let nothing_named = arguments.model.is_empty() && arguments.run.is_empty();
+    let models = if nothing_named { &shipped[..] } else { &arguments.model[..] };
+    let mut systems = Vec::new();
+    for model in models {
+        let (name, path) = named(model);
+        systems.push(System::model(name, Path::new(path))?);
+    }
+    for run in &arguments.run {
+        let (name, folder) = named(run);
+        systems.push(System::run(name, Path::new(folder))?);
+    }
+    for index in 0..systems.len() {
+        let twins = systems[..index].iter().filter(|other| other.name == systems[index].name).count();
+        if twins > 0 {
+            bail!("two systems are called {}; tell them apart with --model NAME=FILE", systems[index].name);
+        }
+    }
+    Ok(systems)
+}
+
+fn named_curves(arguments: &Arguments) -> Result<Vec<(String, Vec<curves::Point>)>> {
+    let mut all = Vec::new();
+    for run in arguments.run.iter().chain(&arguments.curve) {
+        let (name, folder) = named(run);
+        let folder = Path::new(folder);
+        if !folder.is_dir() {
+            bail!("{}: no such folder; check --run and --curve", folder.display());
+        }
+        let fallback = folder.file_name().unwrap_or(folder.as_os_str()).display().to_string();
+        let points = curves::read(folder)?;
+        if points.is_empty() && arguments.curve.contains(run) {
+            bail!(
+                "{}: no learning curve here yet; wait for its first line or check --curve",
+                folder.display()
+            );
+        }
+        all.push((name.map_or(fallback, str::to_owned), points));
+    }
+    Ok(all)
+}
+
+/// `NAME=PATH`, or a path alone.
+fn named(argument: &str) -> (Option<&str>, &str) {
+    argument.split_once('=').map_or((None, argument), |(name, path)| (Some(name), path))
+}
+
+fn read_oracle(path: &Path) -> Result<Vec<OracleSetting>> {
+    let file = fs::File::open(path).with_context(|| format!("--oracle {}", path.display()))?;
+    let parse = |(index, line): (usize, std::io::Result<String>)| -> Result<OracleSetting> {
+        let place =
+            || format!("{}: line {} is not what `gleaner-train oracle` writes", path.display(), index + 1);
+        let setting: OracleSetting = serde_json::from_str(&line?).with_context(place)?;
+        if setting.missions.0.len() != test_preferences().len() {
+            bail!("{}: line {}: not eleven preferences", path.display(), index + 1);
+        }
+        Ok(setting)
+    };
+    BufReader::new(file).lines().enumerate().map(parse).collect()
+}
+
+/// As it was typed.
+fn command_line() -> String {
+    let words =
+        std::env::args().skip(1).map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
+    format!("gleaner-train {}", words.collect::<Vec<_>>().join(" "))
+}
+
+/// The processor, for the inference times.
+fn machine() -> String {
+    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    model
+        .map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| format!("{}, one thread", name.trim()))
+}
+
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let temporary = path.with_extension("writing");
+    fs::write(&temporary, bytes)
+        .and_then(|()| fs::rename(&temporary, path))
+        .with_context(|| path.display().to_string())
+}

@@ -1,0 +1,403 @@
+//! The page: one HTML file that needs nothing else, readable on a desk, on a phone and on paper.
+
+use super::table::{Metric, main_table, metric_table};
+use super::{Detail, Report, figure};
+use crate::explanation::KINDS;
+use crate::paper::{CITATIONS, EXAMPLES, Setting};
+use gleaner_world::ScenarioKind;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// The report as one HTML page.
+#[must_use]
+pub fn page(report: &Report) -> String {
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "Gleaner: the paper's tables and figures, measured" }
+                style { (PreEscaped(include_str!("style.css"))) }
+            }
+            body {
+                (super::drawing::city(&report.heights))
+                (head(report))
+                (main_section(report))
+                (curves_section(report))
+                (fronts_section(report))
+                @match &report.detail {
+                    Some(detail) => {
+                        (trajectories_section(report, detail))
+                        (fading_section(detail))
+                        (engines_section(report))
+                        (generalization_section(report))
+                        (attention_section(detail))
+                    }
+                    None => { (engines_section(report)) (generalization_section(report)) }
+                }
+                (published_section())
+            }
+        }
+    };
+    markup.into_string()
+}
+
+fn head(report: &Report) -> Markup {
+    html! {
+        header {
+            h1 { "The paper's tables and figures, measured" }
+            p {
+                "Every table and figure of " i { "Optimizing Energy and Data Collection in UAV-aided IoT Networks using "
+                "Attention-based Multi-Objective Reinforcement Learning" } " (MOSAC-ATT), measured with Gleaner on "
+                (report.realizations) " fixed evaluation realizations per setting and shown beside the numbers that the "
+                "paper prints. The paper's city is not public, so its numbers come from another map: compare levels and "
+                "order, not decimals."
+            }
+            p.quiet {
+                "Made by " code { (report.command) } ". City " code { (format!("{:016x}", report.city_hash)) }
+                ". The numbers behind the page are in the CSV files beside it."
+            }
+            nav {
+                a href="#results" { "Results" } a href="#curves" { "Learning curves" } a href="#fronts" { "Pareto fronts" }
+                a href="#trajectories" { "Trajectories" } a href="#fading" { "Fading" } a href="#engines" { "Size and time" }
+                a href="#generalization" { "Generalization" } a href="#attention" { "Attention" }
+                a href="#published" { "The paper's numbers" }
+            }
+            (tiles(report))
+        }
+    }
+}
+
+/// The first learned system at a glance.
+fn tiles(report: &Report) -> Markup {
+    let Some(system) = report.systems.get(1) else { return html! {} };
+    let coverage = |kind| system.table(Setting::trained(kind)).map(|table| table.coverage());
+    let energy = |kind| system.table(Setting::trained(kind)).map(|table| table.least_energy());
+    let tile = |value: String, what: &str, paper: &str| {
+        html! { li { span.value { (value) } span.what { (what) } span.paper { "paper: " (paper) } } }
+    };
+    let fading = report.detail.as_ref().and_then(|detail| detail.fading.first());
+    html! {
+        ul.tiles {
+            @for (kind, name, paper) in [(ScenarioKind::ReachDestination, "RD", "about 87 %"), (ScenarioKind::ReturnBase, "RB", "about 85 %")] {
+                @if let Some(coverage) = coverage(kind) {
+                    (tile(format!("{coverage:.1} %"), &format!("data, {name}, K = 6, w = (1, 0)"), paper))
+                }
+            }
+            @if let (Some(rd), Some(rb)) = (energy(ScenarioKind::ReachDestination), energy(ScenarioKind::ReturnBase)) {
+                (tile(format!("{rd:.2} / {rb:.2}"), "battery units, RD / RB, w = (0, 1)", "32 / 2"))
+            }
+            @if let Some((_, regular, faded)) = fading {
+                @let loss = regular.mean_and_std().0 - faded.mean_and_std().0;
+                (tile(points(loss), "data lost to Rayleigh fading, RD", "0.26 points"))
+            }
+            @if let Some(parameters) = system.parameters {
+                (tile(super::chart::grouped(&parameters.to_string()), "parameters", "91\u{2009}781"))
+            }
+            @if let Some(latency) = system.latency {
+                (tile(format!("{:.3} ms", latency.median_us / 1000.0), "one decision, median", "2.0 ms, another processor"))
+            }
+        }
+        p.quiet { (system.name) ": " (system.origin) "." }
+    }
+}
+
+fn points(loss: f32) -> String {
+    // A minus sign here would read as a gain that is a loss.
+    if loss < 0.0 { format!("{:.2} points gained", -loss) } else { format!("{loss:.2} points") }
+}
+
+fn section(id: &str, title: &str, body: Markup) -> Markup {
+    html! { section id=(id) { h2 { (title) } (body) } }
+}
+
+fn main_section(report: &Report) -> Markup {
+    section(
+        "results",
+        "Results in the trained setting",
+        html! {
+            @for kind in ScenarioKind::ALL { (main_table(report, kind)) }
+            p {
+                "RD reaches a destination 32 cells away, RB returns to its base. Data is in percent of what all devices "
+                "hold, energy in battery units; a preference w = (data, energy) weighs the two. "
+                "Hypervolume is the area above (-1, -200) that the eleven preferences dominate: of the front of their "
+                "means, and as the mean over single realizations. The oracle knows map, channel and devices; it is a "
+                "strong search, not a proof. No system can pass the upper bound: it is proven for data and energy, and "
+                "the bounds of utility and hypervolume follow from those two, loosely."
+            }
+        },
+    )
+}
+
+fn curves_section(report: &Report) -> Markup {
+    section(
+        "curves",
+        "Learning curves (figure 4 a, c)",
+        html! {
+            @if report.curves.iter().all(|(_, points)| points.is_empty()) {
+                p { "No run was given: name its folder with " code { "--run" } " or " code { "--curve" } "." }
+            } @else {
+                figure {
+                    (figure::curves_legend(report))
+                    div.panels.two {
+                        @for kind in ScenarioKind::ALL {
+                            div.panel { h3 { "Hypervolume, " (Setting::trained(kind).scenario_name()) } (figure::curves(report, kind)) }
+                        }
+                    }
+                    figcaption {
+                        b { "Figure 4 a, c. " } "Hypervolume of the mean front on 60 validation realizations of the trained "
+                        "setting while learning. These realizations choose the parameters that are kept; all other numbers "
+                        "of this page come from others. The paper shows three seeds over environment steps and says that "
+                        "MOSAC-ATT leads after approximately 150\u{2009}000. From " code { "curves.csv" } "."
+                    }
+                }
+            }
+        },
+    )
+}
+
+fn fronts_section(report: &Report) -> Markup {
+    section(
+        "fronts",
+        "Pareto fronts (figure 4 b, d)",
+        html! {
+            figure {
+                (figure::systems_legend(report, false))
+                div.panels.two {
+                    @for kind in ScenarioKind::ALL {
+                        div.panel { h3 { (Setting::trained(kind).scenario_name()) ", K = 6, B = 80" } (figure::front(report, kind)) }
+                    }
+                }
+                figcaption {
+                    b { "Figure 4 b, d. " } "One mark per preference, w = 0 to 1 in steps of 0.1: means over "
+                    (report.realizations) " realizations. The line joins those that no other dominates; up and right is "
+                    "better. The paper's fronts are a figure without printed numbers. From " code { "fronts.csv" } "."
+                }
+            }
+        },
+    )
+}
+
+fn trajectories_section(report: &Report, detail: &Detail) -> Markup {
+    let printed = |kind: ScenarioKind, w_data: f32| {
+        let found = EXAMPLES.iter().find(|example| example.0 == kind && example.1 == w_data);
+        found.map(|&(_, _, percent, units)| format!("{percent} %, {units} units"))
+    };
+    section(
+        "trajectories",
+        "Trajectories (figure 5)",
+        html! {
+            @for (kind, tracks) in &detail.tracks {
+                @let name = Setting::trained(*kind).scenario_name();
+                figure {
+                    div.panels {
+                        @for track in tracks {
+                            div.panel {
+                                h3 { (name) ", w = (" (track.w_data) ", " (1.0 - track.w_data) ")" }
+                                (figure::mission(report, name, track))
+                                p {
+                                    (format!("{:.0} % of the data, {} units", track.data_percent, track.energy))
+                                    @if let Some(printed) = printed(*kind, track.w_data) {
+                                        br; span.quiet { "paper, its own example: " (printed) }
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            figure { figcaption {
+                b { "Figure 5. " } (detail.system) " on evaluation realization " (detail.example) " for three "
+                "preferences, north up. Darker roofs are higher. S start, T terminal, B base. Circles with a filled slice: "
+                "devices, and the share of their data that was collected. Blue discs: hovering, larger for longer. From "
+                code { "trajectories.csv" } "."
+            } }
+        },
+    )
+}
+
+fn fading_section(detail: &Detail) -> Markup {
+    let rows = detail.fading.iter().map(|(kind, regular, faded)| {
+        let name = Setting::trained(*kind).scenario_name();
+        (name, regular.mean_and_std(), faded.mean_and_std(), regular.0.len())
+    });
+    let repeats = detail.fading.first().map_or(0, |(_, regular, _)| regular.0.len());
+    section(
+        "fading",
+        "Robustness to fading (table I)",
+        html! {
+            div.scroll { table {
+                caption {
+                    b { "Table I. " } "Data at w = (1, 0), K = 6, B = 80, percent: the mean over the realizations, flown "
+                    (repeats) " times with other draws of the channel; mean and standard deviation of the "
+                    (repeats) " means. With fading, every link gains 20 log10 |h| dB, |h| Rayleigh-distributed with scale "
+                    "1. Policies are trained without. The paper does not say which scenario its table is of; its level is "
+                    "RD's. Oracle and upper bound were not computed under fading. From " code { "fading.csv" } "."
+                }
+                thead { tr {
+                    th scope="col" { "system" } th scope="col" { "regular" span.unit { "%" } }
+                    th scope="col" { "with fading" span.unit { "%" } } th scope="col" { "loss" span.unit { "points" } }
+                } }
+                tbody {
+                    tr.reference {
+                        th scope="row" { "paper, MOSAC-ATT" } td { "87.49 ± 0.16" } td { "87.23 ± 0.28" } td { "0.26" }
+                    }
+                    @for (name, regular, faded, _) in rows {
+                        tr {
+                            th scope="row" { (detail.system) ", " (name) }
+                            td { (format!("{:.2} ± {:.2}", regular.0, regular.1)) }
+                            td { (format!("{:.2} ± {:.2}", faded.0, faded.1)) }
+                            td { (super::chart::grouped(&format!("{:.2}", regular.0 - faded.0))) }
+                        }
+                    }
+                }
+            } }
+        },
+    )
+}
+
+fn engines_section(report: &Report) -> Markup {
+    section(
+        "engines",
+        "Size and inference time (section V-C)",
+        html! {
+            div.scroll { table {
+                caption {
+                    "Parameters of the policy that decides, and the time of one decision with one observation at a time: "
+                    "median and 99th percentile, measured on " (report.machine) ". The time includes building the tokens. "
+                    "The paper measured on an Intel Xeon Gold 6278C with 4 cores. From " code { "engines.csv" } "."
+                }
+                thead { tr {
+                    th scope="col" { "system" } th scope="col" { "parameters" }
+                    th scope="col" { "median" span.unit { "ms" } } th scope="col" { "99 %" span.unit { "ms" } }
+                    th scope="col" { "read from, flown by" }
+                } }
+                tbody {
+                    tr.reference { th scope="row" { "paper, MOSAC-ATT" } td { "91\u{2009}781" } td { "2.0 (mean)" } td.missing { "not printed" } td.text { "" } }
+                    tr.reference { th scope="row" { "paper, MOSAC-CGL" } td { "165\u{2009}829" } td { "1.3 (mean)" } td.missing { "not printed" } td.text { "" } }
+                    @for system in &report.systems {
+                        tr {
+                            th scope="row" { (system.name) }
+                            @match system.parameters {
+                                Some(count) => td { (super::chart::grouped(&count.to_string())) },
+                                None => td.missing { "none" }
+                            }
+                            @match system.latency {
+                                Some(latency) => {
+                                    td { (format!("{:.3}", latency.median_us / 1000.0)) }
+                                    td { (format!("{:.3}", latency.p99_us / 1000.0)) }
+                                }
+                                None => { td.missing { "not measured" } td.missing { "not measured" } }
+                            }
+                            td.text { (system.origin) }
+                        }
+                    }
+                }
+            } }
+        },
+    )
+}
+
+fn generalization_section(report: &Report) -> Markup {
+    let shown = [Metric::Coverage, Metric::LeastEnergy, Metric::Utility];
+    section(
+        "generalization",
+        "Generalization to other numbers of devices (figure 6)",
+        html! {
+            figure {
+                (figure::systems_legend(report, true))
+                @for kind in ScenarioKind::ALL {
+                    div.panels {
+                        @for metric in shown {
+                            div.panel {
+                                h3 { (Setting::trained(kind).scenario_name()) ", " (metric.name()) }
+                                (figure::generalization(report, kind, metric))
+                            }
+                        }
+                    }
+                }
+                figcaption {
+                    b { "Figure 6. " } "By number of devices K; B = 80, and B = 100 for K = 10. The trained setting is set "
+                    "off. Stars: numbers that the paper prints for MOSAC-ATT. Bars at the battery: standard deviation. From "
+                    code { "metrics.csv" } "."
+                }
+            }
+            @for metric in Metric::ALL { (metric_table(report, metric)) }
+        },
+    )
+}
+
+fn attention_section(detail: &Detail) -> Markup {
+    section(
+        "attention",
+        "Attention (figure 7)",
+        html! {
+            @if detail.gazes.is_empty() {
+                p { (detail.system) " has no attention." }
+            } @else {
+                figure {
+                    div.panels {
+                        @for gaze in &detail.gazes {
+                            div.panel {
+                                h3 { "First slot, w = (" (gaze.w_data) ", " (1.0 - gaze.w_data) ")" }
+                                (figure::attention(gaze))
+                            }
+                        }
+                        div.panel {
+                            h3 { "Along the whole mission" }
+                            (figure::shares_legend(detail))
+                            (figure::shares(detail))
+                        }
+                    }
+                    figcaption {
+                        b { "Figure 7. " } "Second attention layer of " (detail.system) ", mean over the heads, RD, K = 6. "
+                        "Matrices: the first slot of evaluation realization " (detail.example) ", darker for more; the grey "
+                        "part belongs to the six absent devices. Right: the column sums, by kind of token, as a share of all "
+                        "attention, averaged over the slots of each mission and then over all realizations. The paper finds "
+                        "that w = (1, 0) attends to the devices and w = (0, 1) almost entirely to the preference. From "
+                        code { "attention_initial.csv" } " and " code { "attention.csv" } "."
+                    }
+                }
+                (shares_table(detail))
+            }
+        },
+    )
+}
+
+fn shares_table(detail: &Detail) -> Markup {
+    html! {
+        div.scroll { table {
+            caption { "Share of all attention that each kind of token receives, percent. From " code { "attention.csv" } "." }
+            thead { tr { th scope="col" { "preference" } @for kind in KINDS { th scope="col" { (kind) span.unit { "%" } } } } }
+            tbody {
+                @for gaze in &detail.gazes {
+                    tr {
+                        th scope="row" { "w = (" (gaze.w_data) ", " (1.0 - gaze.w_data) ")" }
+                        @for share in gaze.along { td { (format!("{:.1}", 100.0 * share)) } }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+fn published_section() -> Markup {
+    section(
+        "published",
+        "The paper's printed numbers",
+        html! {
+            p {
+                "All numbers of its results that the paper prints in text or table. Where this page says \"not printed\", "
+                "the paper has a figure only, and nothing was read off a picture. From " code { "published.csv" } "."
+            }
+            div.scroll { table {
+                thead { tr { th scope="col" { "what" } th scope="col" { "value" } th scope="col" { "place" } } }
+                tbody {
+                    @for cited in &CITATIONS {
+                        tr { th scope="row" { (cited.what) } td { (cited.value) } td { (cited.place) } }
+                    }
+                }
+            } }
+        },
+    )
+}

@@ -1,0 +1,244 @@
+//! The tables: every one with the oracle and the bound beside the systems, and with words where there is no number.
+
+use super::Report;
+use super::chart::grouped;
+use super::csv::ORACLE;
+use crate::evaluation::Table;
+use crate::paper::{Limits, Setting};
+use gleaner_world::ScenarioKind;
+use maud::{Markup, html};
+
+/// What the bound is called in tables and legends.
+pub(super) const BOUND: &str = "upper bound";
+/// What the paper's numbers are called.
+pub(super) const PAPER: &str = "paper";
+const NOT_COMPUTED: &str = "not computed";
+
+/// One of the paper's metrics.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Metric {
+    Coverage,
+    LeastEnergy,
+    Utility,
+    Hypervolume,
+    MeanHypervolume,
+}
+
+impl Metric {
+    pub const ALL: [Metric; 5] = [
+        Metric::Coverage,
+        Metric::LeastEnergy,
+        Metric::Utility,
+        Metric::Hypervolume,
+        Metric::MeanHypervolume,
+    ];
+
+    pub const fn name(self) -> &'static str {
+        match self {
+            Metric::Coverage => "data at w = (1, 0)",
+            Metric::LeastEnergy => "battery at w = (0, 1)",
+            Metric::Utility => "average utility",
+            Metric::Hypervolume => "hypervolume of the mean front",
+            Metric::MeanHypervolume => "mean hypervolume",
+        }
+    }
+
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Metric::Coverage => "% of the data",
+            Metric::LeastEnergy => "battery units",
+            Metric::Utility => "w . (%, -units)",
+            Metric::Hypervolume | Metric::MeanHypervolume => "% x units",
+        }
+    }
+
+    pub fn of(self, table: &Table) -> f64 {
+        match self {
+            Metric::Coverage => f64::from(table.coverage()),
+            Metric::LeastEnergy => f64::from(table.least_energy()),
+            Metric::Utility => f64::from(table.utility),
+            Metric::Hypervolume => table.hypervolume,
+            Metric::MeanHypervolume => table.mean_hypervolume,
+        }
+    }
+
+    /// How far single realizations are from the mean, where the paper gives it.
+    pub fn spread(self, table: &Table) -> f64 {
+        if self == Metric::LeastEnergy { f64::from(table.least_energy_std()) } else { 0.0 }
+    }
+
+    /// The limit that no system can pass. For energy it is known without any computation.
+    pub fn limit(self, setting: Setting, limits: Option<Limits>) -> Option<f64> {
+        match self {
+            Metric::Coverage => limits.map(|limits| f64::from(limits.data_percent)),
+            Metric::LeastEnergy => Some(f64::from(setting.least_energy())),
+            Metric::Utility => limits.map(|limits| f64::from(limits.utility())),
+            Metric::Hypervolume => limits.map(Limits::hypervolume),
+            // The mean of rectangles with one side fixed is the rectangle of the mean.
+            Metric::MeanHypervolume => limits.map(Limits::hypervolume),
+        }
+    }
+
+    pub fn text(self, value: f64) -> String {
+        match self {
+            Metric::Coverage => format!("{value:.1}"),
+            Metric::LeastEnergy | Metric::Utility => grouped(&format!("{value:.2}")),
+            Metric::Hypervolume | Metric::MeanHypervolume => grouped(&format!("{value:.0}")),
+        }
+    }
+
+    fn published(self, setting: Setting) -> Option<&'static str> {
+        match self {
+            Metric::Coverage => setting.published().coverage,
+            Metric::LeastEnergy => Some(setting.published().least_energy),
+            Metric::Utility | Metric::Hypervolume | Metric::MeanHypervolume => None,
+        }
+    }
+
+    fn is_better(self, a: f64, b: f64) -> bool {
+        if self == Metric::LeastEnergy { a < b } else { a > b }
+    }
+}
+
+/// A number, its deviation, and how much of the oracle's it is.
+fn cell(metric: Metric, table: &Table, oracle: Option<&Table>, is_best: bool) -> Markup {
+    let value = metric.of(table);
+    html! {
+        td.best[is_best] {
+            (metric.text(value))
+            @if metric == Metric::LeastEnergy { " ± " (format!("{:.2}", metric.spread(table))) }
+            @if let Some(share) = share_of_oracle(metric, value, oracle) { small { (share) } }
+        }
+    }
+}
+
+fn share_of_oracle(metric: Metric, value: f64, oracle: Option<&Table>) -> Option<String> {
+    let oracle = metric.of(oracle?);
+    let has_share = matches!(metric, Metric::Coverage | Metric::Hypervolume | Metric::MeanHypervolume);
+    (has_share && oracle > 0.0).then(|| format!("{:.1} % of oracle", 100.0 * value / oracle))
+}
+
+fn missing() -> Markup {
+    html! { td.missing { (NOT_COMPUTED) } }
+}
+
+fn limit_cell(metric: Metric, setting: Setting, limits: Option<Limits>) -> Markup {
+    metric.limit(setting, limits).map_or_else(missing, |limit| html! { td { (metric.text(limit)) } })
+}
+
+/// Systems in rows, metrics in columns: one scenario in the setting that is trained in.
+pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
+    let setting = Setting::trained(kind);
+    let tables: Vec<Option<Table>> = report.systems.iter().map(|system| system.table(setting)).collect();
+    let oracle = report.oracle(setting).map(|oracle| oracle.missions.table());
+    let limits = report.limits(setting);
+    let best = |metric: Metric| best_of(metric, tables.iter().flatten());
+    html! {
+        div.scroll { table {
+            caption {
+                b { (setting.scenario_name()) ", K = " (setting.devices) ", B = " (setting.battery) ". " }
+                "Mean over " (report.realizations) " realizations; ± is the standard deviation among them. Bold: the best "
+                "of the systems. From " code { "metrics.csv" } ". " (bounded(report, setting))
+            }
+            thead { tr {
+                th scope="col" { "system" }
+                @for metric in Metric::ALL { th scope="col" { (metric.name()) span.unit { (metric.unit()) } } }
+            } }
+            tbody {
+                tr.reference {
+                    th scope="row" { (PAPER) ", MOSAC-ATT" }
+                    @for metric in Metric::ALL { (published_cell(metric, setting)) }
+                }
+                @for (system, table) in report.systems.iter().zip(&tables) {
+                    tr {
+                        th scope="row" { (system.name) }
+                        @for metric in Metric::ALL {
+                            @match table {
+                                Some(table) => {
+                                    (cell(metric, table, oracle.as_ref(), best(metric) == Some(metric.of(table))))
+                                }
+                                None => (missing())
+                            }
+                        }
+                    }
+                }
+                tr.reference {
+                    th scope="row" { (ORACLE) }
+                    @for metric in Metric::ALL {
+                        @match &oracle { Some(table) => (cell(metric, table, None, false)), None => (missing()) }
+                    }
+                }
+                tr.reference {
+                    th scope="row" { (BOUND) }
+                    @for metric in Metric::ALL { (limit_cell(metric, setting, limits)) }
+                }
+            }
+        } }
+    }
+}
+
+/// Settings in rows, systems in columns: one metric.
+pub(super) fn metric_table(report: &Report, metric: Metric) -> Markup {
+    html! {
+        div.scroll { table {
+            caption {
+                b { (metric.name()) ", " (metric.unit()) ". " }
+                "Mean over " (report.realizations) " realizations a row; the trained setting is set off. From "
+                code { "metrics.csv" } "."
+            }
+            thead { tr {
+                th scope="col" { "setting" }
+                th scope="col" { (PAPER) span.unit { "MOSAC-ATT" } }
+                @for system in &report.systems { th scope="col" { (system.name) } }
+                th scope="col" { (ORACLE) }
+                th scope="col" { (BOUND) }
+            } }
+            tbody { @for setting in Setting::ALL { (metric_row(report, metric, setting)) } }
+        } }
+    }
+}
+
+fn metric_row(report: &Report, metric: Metric, setting: Setting) -> Markup {
+    let tables: Vec<Option<Table>> = report.systems.iter().map(|system| system.table(setting)).collect();
+    let oracle = report.oracle(setting).map(|oracle| oracle.missions.table());
+    let best = best_of(metric, tables.iter().flatten());
+    html! {
+        tr.trained[setting == Setting::trained(setting.kind)] {
+            th scope="row" { (setting.scenario_name()) ", K = " (setting.devices) ", B = " (setting.battery) }
+            (published_cell(metric, setting))
+            @for table in &tables {
+                @match table {
+                    Some(table) => (cell(metric, table, oracle.as_ref(), best == Some(metric.of(table)))),
+                    None => (missing()),
+                }
+            }
+            @match &oracle { Some(table) => (cell(metric, table, None, false)), None => (missing()) }
+            (limit_cell(metric, setting, report.limits(setting)))
+        }
+    }
+}
+
+fn published_cell(metric: Metric, setting: Setting) -> Markup {
+    match metric.published(setting) {
+        Some(text) => html! { td { (text) } },
+        None => html! { td.missing { "not printed" } },
+    }
+}
+
+fn best_of<'a>(metric: Metric, tables: impl Iterator<Item = &'a Table>) -> Option<f64> {
+    tables.map(|table| metric.of(table)).reduce(|a, b| if metric.is_better(b, a) { b } else { a })
+}
+
+/// How much of the bound was computed, in words.
+fn bounded(report: &Report, setting: Setting) -> String {
+    match report.oracle(setting) {
+        None => format!("{ORACLE} and {BOUND} were not computed for this report."),
+        Some(oracle) => {
+            let flown = oracle.missions.realizations();
+            let bounded = oracle.upper_bound_percent.len();
+            let oracle = format!("{ORACLE}: {flown} realizations");
+            let bound = if bounded == 0 { "not computed".into() } else { format!("{bounded} realizations") };
+            format!("{oracle}; {BOUND} of the data: {bound}.")
+        }
+    }
+}
