@@ -1,17 +1,10 @@
-//! Who is on board: the pilot in this process, or one behind byte streams.
+//! Who is on board: the pilot in this process, or one behind byte streams ([`crate::Wired`]).
 
 use crate::simulation::Simulation;
-use crate::wire::Speaker;
-use gleaner_link::{Address, TUNNEL_RADIO_REPORT};
 use gleaner_pilot::Onboard;
 use gleaner_policy::Policy;
-use gleaner_ports::{Port, RECEIVE_BYTES, State, wait};
-use gleaner_radio::{Report, encode, encode_body};
+use gleaner_radio::encode;
 use gleaner_units::Instant;
-use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
-use std::io;
-use std::time;
 
 /// A pilot that can be flown with.
 pub trait Aboard {
@@ -36,118 +29,6 @@ impl<P: Policy> Aboard for Onboard<P> {
                 break;
             }
             simulation.hear_companion(&buffer[..length]);
-        }
-    }
-}
-
-/// Reads per port and exchange: a flood on one port must not stop the world.
-const READS_AT_ONCE: usize = 64;
-
-/// Somewhere else and on its own clock: a board, an emulator or a companion computer behind one port for the
-/// autopilot's link and one for the radio's reports. Without the second, the reports come by `TUNNEL` on the first.
-pub struct Wired {
-    autopilot: Port,
-    radio: Option<Port>,
-    /// The radio as a component of the vehicle.
-    modem: Speaker,
-}
-
-impl Wired {
-    /// `MAV_COMP_ID_TELEMETRY_RADIO`.
-    const MODEM: Address = Address::new(1, 68);
-
-    /// A pilot behind these ports.
-    #[must_use]
-    pub const fn new(autopilot: Port, radio: Option<Port>) -> Wired {
-        Wired { autopilot, radio, modem: Speaker::new(Wired::MODEM) }
-    }
-
-    /// The port of the autopilot's link.
-    #[must_use]
-    pub const fn autopilot(&self) -> &Port {
-        &self.autopilot
-    }
-
-    /// The port of the radio's reports.
-    #[must_use]
-    pub const fn radio(&self) -> Option<&Port> {
-        self.radio.as_ref()
-    }
-
-    /// Whether bytes can travel to and from the pilot.
-    #[must_use]
-    pub fn is_up(&self) -> bool {
-        self.autopilot.state() == State::Up
-    }
-
-    /// Mends ports that went down; call it some times a second.
-    pub fn maintain(&mut self, now: time::Instant) {
-        // Peers come and go; what matters of it is in `is_up`.
-        for port in [Some(&mut self.autopilot), self.radio.as_mut()].into_iter().flatten() {
-            let _ = port.maintain(now);
-        }
-    }
-
-    /// Waits for a pilot that connects; whether one has. What it says first is kept.
-    ///
-    /// # Errors
-    /// The operating system cannot wait.
-    pub fn await_peer(&mut self, at_most: time::Duration) -> io::Result<bool> {
-        if !self.is_up() {
-            wait(&[&self.autopilot], at_most)?;
-            // An empty buffer takes nothing but the connection.
-            self.autopilot.receive(&mut []);
-        }
-        Ok(self.is_up())
-    }
-
-    /// Sleeps until a port has something to say or the time is over.
-    pub fn rest(&self, at_most: time::Duration) {
-        let ports: Vec<&Port> = [Some(&self.autopilot), self.radio()].into_iter().flatten().collect();
-        if wait(&ports, at_most).is_err() {
-            // Without the system's help.
-            std::thread::sleep(at_most);
-        }
-    }
-
-    fn report(&mut self, report: &Report) {
-        match &mut self.radio {
-            Some(radio) => radio.send(&encode(report)),
-            None => {
-                // By hand: the definitions do not list types for local use.
-                let body = encode_body(report);
-                let [low, high] = TUNNEL_RADIO_REPORT.to_le_bytes();
-                let mut payload = vec![low, high, 0, 0, body.len() as u8];
-                payload.extend_from_slice(&body);
-                self.autopilot.send(&self.modem.raw_frame(TUNNEL_DATA::ID, &payload));
-            }
-        }
-    }
-}
-
-impl Aboard for Wired {
-    fn exchange(&mut self, simulation: &mut Simulation, _: Instant) {
-        receive(&mut self.autopilot, |bytes| simulation.hear_companion(bytes));
-        if let Some(radio) = &mut self.radio {
-            // A radio hears nothing, but a listening port must look for its peer.
-            receive(radio, |_| {});
-        }
-        for frame in simulation.to_companion() {
-            self.autopilot.send(&frame);
-        }
-        for report in simulation.radio() {
-            self.report(&report);
-        }
-    }
-}
-
-/// Reads what is there.
-pub(crate) fn receive(port: &mut Port, mut take: impl FnMut(&[u8])) {
-    let mut buffer = [0; RECEIVE_BYTES];
-    for _ in 0..READS_AT_ONCE {
-        match port.receive(&mut buffer) {
-            0 => break,
-            count => take(&buffer[..count]),
         }
     }
 }

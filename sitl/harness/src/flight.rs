@@ -51,6 +51,8 @@ pub enum IncidentKind {
     Voltage(f32),
     /// The pack loses charge.
     LosesBattery(BatteryUnits),
+    /// The autopilot's supply fails for a moment.
+    AutopilotReboots,
 }
 
 /// Why a flight could not be flown at all.
@@ -281,6 +283,7 @@ fn happen(simulation: &mut Simulation, kind: IncidentKind) {
         IncidentKind::PilotSelects(mode) => copter.pilot_selects(mode),
         IncidentKind::Voltage(volts) => copter.set_voltage(volts),
         IncidentKind::LosesBattery(units) => copter.lose_battery(units),
+        IncidentKind::AutopilotReboots => copter.reboot(),
         IncidentKind::Fence(radius_m) => {
             for (name, value) in [("FENCE_TYPE", 2.0), ("FENCE_RADIUS", radius_m), ("FENCE_ENABLE", 1.0)] {
                 copter.set_parameter(name, value);

@@ -97,6 +97,11 @@ impl Journal {
         &self.slots
     }
 
+    /// The frames of companion, autopilot and ground station, in order, each with the time since the autopilot's boot.
+    pub fn frames(&self) -> impl Iterator<Item = (Instant, &[u8])> {
+        self.frames.iter().map(|(at, frame)| (*at, frame.as_slice()))
+    }
+
     /// Writes the frames as a telemetry log: for each the time in microseconds since 1970 as eight big-endian bytes,
     /// then the frame. Ground stations and pymavlink read it.
     ///

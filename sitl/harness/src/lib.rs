@@ -42,8 +42,9 @@ pub mod program;
 mod referee;
 mod simulation;
 mod wire;
+mod wired;
 
-pub use aboard::{Aboard, Wired};
+pub use aboard::Aboard;
 pub use autopilot::{Copter, CopterMode, CopterSettings, LinkId, Pack, Truth};
 pub use flight::{Ending, Figures, Flight, FlightError, Flown, Incident, IncidentKind, STEP, Wishes, fly};
 pub use journal::{Journal, Slot, TrackPoint};
@@ -54,3 +55,4 @@ pub use pace::Pace;
 pub use picture::trajectory;
 pub use referee::{Breach, Referee, Violation};
 pub use simulation::Simulation;
+pub use wired::{Wired, fly_wired};

@@ -4,7 +4,7 @@ use super::arguments::{BoardOrder, FlyOrder};
 use super::introduction::{ports, write_mission};
 use super::results::Brain;
 use super::{ProgramError, model, results};
-use crate::{Ending, Figures, Flight, FlightError, Flown, Pace, Staged, Wired, Wishes};
+use crate::{Ending, Figures, Flight, FlightError, Flown, Staged, Wired, Wishes, fly_wired};
 use gleaner_pilot::Settings;
 use gleaner_ports::{Endpoint, Port};
 use gleaner_world::World;
@@ -13,8 +13,6 @@ use std::time::{Duration, Instant};
 
 /// How long a board may take to connect.
 const CONNECT_LIMIT: Duration = Duration::from_secs(120);
-/// How long a board's port may be closed in flight: a cable that is plugged in again.
-const GONE_LIMIT: Duration = Duration::from_secs(5);
 
 pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
     let begun = Instant::now();
@@ -65,26 +63,7 @@ fn fly_board(
         wired.maintain(Instant::now());
     }
     let flight = Flight::new(staged, wishes, Settings::default().component_id).map_err(FlightError::from)?;
-    Ok(fly_wired(flight, &mut wired, order.plan.haste))
-}
-
-fn fly_wired(mut flight: Flight, wired: &mut Wired, haste: f32) -> Flown {
-    let mut pace = Pace::new(haste);
-    let mut up_at = Instant::now();
-    loop {
-        for _ in 0..pace.due() {
-            if let Some(ending) = flight.step(wired) {
-                return flight.end(ending, None);
-            }
-        }
-        wired.maintain(Instant::now());
-        if wired.is_up() {
-            up_at = Instant::now();
-        } else if up_at.elapsed() > GONE_LIMIT {
-            return flight.end(Ending::PilotGone, None);
-        }
-        wired.rest(pace.rest());
-    }
+    Ok(fly_wired(flight, &mut wired, |_, _| None))
 }
 
 fn switches(flown: &Flown) -> String {

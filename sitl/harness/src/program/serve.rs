@@ -5,7 +5,7 @@ use super::arguments::ServeOrder;
 use super::introduction::{ports, write_mission};
 use super::results::Brain;
 use super::{model, results};
-use crate::aboard::receive;
+use crate::wired::receive;
 use crate::{Aboard, Figures, FlightError, Operator, Orders, Pace, STEP, Simulation, Staged, Wired};
 use gleaner_pilot::{Onboard, Parameters, Settings};
 use gleaner_policy::onnx::TractPolicy;
