@@ -44,7 +44,15 @@ impl Normalisation {
     /// The number that the network's first layer sees.
     #[must_use]
     pub fn apply(&self, physical: f32) -> f32 {
-        ((physical + self.shift) / self.scale).clamp(self.low, self.high)
+        let normal = (physical + self.shift) / self.scale;
+        // `clamp` would have to panic on a low above a high.
+        if normal < self.low {
+            self.low
+        } else if normal > self.high {
+            self.high
+        } else {
+            normal
+        }
     }
 }
 
