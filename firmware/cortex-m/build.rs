@@ -15,11 +15,22 @@ mod board {
     /// The mission of an image that is built without `GLEANER_MISSION`.
     const EXAMPLE: &str = "../companion/dist/mission.toml";
 
+    /// The panic handler stands in a section of its own, which is empty when nothing can reach it.
+    const NO_PANIC: &str = "ASSERT(SIZEOF(.gleaner_panic) == 0, \"a panic is left in the image: \
+        build with GLEANER_ALLOW_PANIC=1, then firmware/cortex-m/panics.sh IMAGE names its callers\")\n";
+
     pub fn prepare() {
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
         // The linker finds `memory.x` in the workspace's root; editing it must link again.
         println!("cargo::rerun-if-changed=../../memory.x");
-        fs::write(out.join("gleaner.x"), read(Path::new("gleaner.x"))).expect("OUT_DIR can be written");
+        let mut script = read(Path::new("gleaner.x"));
+        println!("cargo::rerun-if-env-changed=GLEANER_ALLOW_PANIC");
+        if env::var("PROFILE").is_ok_and(|profile| profile == "release")
+            && env::var_os("GLEANER_ALLOW_PANIC").is_none()
+        {
+            script += NO_PANIC;
+        }
+        fs::write(out.join("gleaner.x"), script).expect("OUT_DIR can be written");
         let mission = env::var_os("GLEANER_MISSION").map_or(PathBuf::from(EXAMPLE), PathBuf::from);
         println!("cargo::rerun-if-env-changed=GLEANER_MISSION");
         fs::write(out.join("mission.bin"), image(&mission)).expect("OUT_DIR can be written");
@@ -27,6 +38,9 @@ mod board {
         println!("cargo::rerun-if-env-changed=DEFMT_LOG");
         println!("cargo::rustc-env=DEFMT_LOG={}", env::var("DEFMT_LOG").unwrap_or("info".to_owned()));
         println!("cargo::rustc-link-search={}", out.display());
+        if cfg!(feature = "h743") {
+            println!("cargo::rustc-link-arg-bins=--defsym=h743=1");
+        }
         for argument in ["--nmagic", "-Tlink.x", "-Tgleaner.x", "-Tdefmt.x"] {
             println!("cargo::rustc-link-arg-bins={argument}");
         }

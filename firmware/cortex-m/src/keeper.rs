@@ -94,3 +94,74 @@ impl<F: NorFlash> Keeper<F> {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::Double;
+
+    fn with_speed(speed: f32) -> Parameters {
+        let mut parameters = Parameters::default();
+        parameters.set_id(ParameterId::Speed, speed).unwrap();
+        parameters.set_id(ParameterId::Enable, 1.0).unwrap();
+        parameters
+    }
+
+    /// Two seconds and a bit after `at`, at the rate of the decision loop.
+    fn settle(keeper: &mut Keeper<Double>, at: u64, speed: f32, state: State) -> Option<News> {
+        let parameters = with_speed(speed);
+        (0..=101)
+            .filter_map(|tick| keeper.poll(Instant::from_millis(at + tick * 20), &parameters, state))
+            .last()
+    }
+
+    #[test]
+    fn a_change_is_saved_when_it_has_settled_and_the_request_to_engage_never_is() {
+        let double = Double::new();
+        let (mut keeper, news) = Keeper::open(double.clone());
+        assert_eq!(news, None);
+        for turn in 0..50_u64 {
+            let speed = 2.0 + turn as f32 / 10.0;
+            assert_eq!(keeper.poll(Instant::from_millis(turn * 100), &with_speed(speed), State::Idle), None);
+        }
+        assert_eq!(double.operations(), 0, "still being turned");
+        assert_eq!(settle(&mut keeper, 5_000, 8.0, State::Idle), None);
+        let operations = double.operations();
+        assert!(operations > 0);
+        assert_eq!(settle(&mut keeper, 10_000, 8.0, State::Idle), None);
+        assert_eq!(double.operations(), operations, "once");
+        let (again, _) = Keeper::open(double);
+        assert_eq!((again.saved().speed().0, again.saved().enable()), (8.0, Enable::Off));
+    }
+
+    #[test]
+    fn in_flight_no_sector_is_erased_and_afterwards_the_change_is_kept_all_the_same() {
+        let double = Double::new();
+        let (mut keeper, _) = Keeper::open(double.clone());
+        for (minute, speed) in [(0, 2.0), (1, 3.0), (2, 4.0), (3, 5.0)] {
+            settle(&mut keeper, minute * 60_000, speed, State::Idle);
+        }
+        let operations = double.operations();
+        assert_eq!(settle(&mut keeper, 300_000, 6.0, State::Engaged), None);
+        assert_eq!(double.operations(), operations, "the sector is full");
+        assert_eq!(settle(&mut keeper, 400_000, 6.0, State::Done), None);
+        assert_eq!(Keeper::open(double).0.saved().speed().0, 6.0);
+    }
+
+    #[test]
+    fn a_flash_that_refuses_is_said_once_for_each_change() {
+        let double = Double::new();
+        let (mut keeper, _) = Keeper::open(double.clone());
+        double.power_for(Some(0));
+        assert_eq!(settle(&mut keeper, 0, 2.0, State::Idle), Some(News::NotSaved));
+        let operations = double.operations();
+        assert_eq!(settle(&mut keeper, 60_000, 2.0, State::Idle), None);
+        assert_eq!(double.operations(), operations);
+        assert_eq!(settle(&mut keeper, 120_000, 3.0, State::Idle), Some(News::NotSaved));
+        assert!(
+            [News::ChangeLost, News::Damaged, News::NotSaved]
+                .iter()
+                .all(|news| std::format!("{news}").len() <= 50)
+        );
+    }
+}

@@ -28,7 +28,7 @@ impl fmt::Display for Cause {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Cause::Panic { line } => write!(f, "panic in line {line}"),
-            Cause::HardFault { at } => write!(f, "hard fault at {at:#010x}"),
+            Cause::HardFault { at } => write!(f, "fault at {at:#010x}"),
             Cause::ClockFailed => write!(f, "crystal stopped"),
             Cause::Unexpected { interrupt } => write!(f, "interrupt {interrupt}"),
         }
@@ -161,9 +161,9 @@ mod tests {
         assert_eq!(told(flying, WATCHDOG), "gleaner: restarted in flight: watchdog");
         assert_eq!(told(idle, NONE), "gleaner: restarted: reset");
         let fault = Cause::HardFault { at: 0x0801_2345 };
-        assert_eq!(told(flying.ended(fault), NONE), "gleaner: restarted in flight: hard fault at 0x08012345");
+        assert_eq!(told(flying.ended(fault), NONE), "gleaner: restarted in flight: fault at 0x08012345");
         for cause in
-            [Cause::Panic { line: u32::MAX }, fault, Cause::ClockFailed, Cause::Unexpected { interrupt: 81 }]
+            [Cause::Panic { line: 99_999 }, fault, Cause::ClockFailed, Cause::Unexpected { interrupt: 81 }]
         {
             let words = flying.ended(cause);
             assert_eq!(words.told(NONE).unwrap().cause, Some(cause));

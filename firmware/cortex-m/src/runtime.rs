@@ -161,3 +161,6 @@ fn take(port: &mut (impl Read + ReadReady), mut receive: impl FnMut(&[u8])) {
         receive(buffer.get(..count).unwrap_or(&[]));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -212,3 +212,5 @@ fn parameters_of(slot: &Slot) -> (Parameters, bool) {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::Double;

@@ -4,6 +4,7 @@
 //! half-written can leave while the words are kept.
 #![allow(unsafe_code)]
 
+use super::lines::gleaner_silence;
 use crate::{Cause, LastWords};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
@@ -14,11 +15,6 @@ unsafe extern "C" {
     /// over a reset, and noise after power was off.
     // SAFETY: aligned and large enough by the memory map; every bit pattern is a valid u32.
     safe static _last_words: [AtomicU32; 5];
-}
-
-unsafe extern "Rust" {
-    /// Stops all transmitters. Each board defines it, with only register writes that cannot fail.
-    safe fn gleaner_silence();
 }
 
 /// What is kept in RAM.

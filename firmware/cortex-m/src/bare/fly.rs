@@ -1,10 +1,9 @@
 //! From reset to the endless main loop, the same on every board.
 
 use super::log::Defmt;
-use super::{fault, flash, now};
-use crate::{Cause, Keeper, LastWords, PortStats, ResetFlags, Runtime, Timed};
+use super::{fault, flash, lines, now};
+use crate::{Cause, Keeper, LastWords, ResetFlags, Runtime, Timed};
 use core::fmt;
-use embedded_io::{Read, ReadReady, Write, WriteReady};
 use embedded_storage::nor_flash::NorFlash;
 use gleaner_link::Severity;
 use gleaner_pilot::{Mission, Onboard, Parameters, Settings, State, mission_image};
@@ -16,19 +15,13 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 /// What a board lends to the pilot.
 pub trait Board {
-    /// The serial line to the autopilot.
-    type Link: Read + ReadReady + Write + WriteReady;
-    /// The serial line of the radio.
-    type Radio: Read + ReadReady;
     /// The flash for the parameters.
     type Flash: NorFlash;
 
-    /// The two lines and the flash.
-    fn take(self) -> (Self::Link, Self::Radio, Self::Flash);
-    /// Counters of the two lines.
-    fn losses() -> [PortStats; 2];
     /// What the reset controller remembers of the last reset.
     fn reset_flags(&self) -> ResetFlags;
+    /// The flash.
+    fn flash(self) -> Self::Flash;
     /// Starts the watchdog: from now on a second without a feed is a reset.
     fn start_watchdog();
     /// Feeds the watchdog. Called after each poll of the pilot, and from nowhere else.
@@ -53,8 +46,7 @@ static ONBOARD: StaticCell<Onboard<Timed<Engine>>> = StaticCell::new();
 pub fn fly<B: Board>(board: B) -> ! {
     let before = fault::last_words().told(board.reset_flags());
     fault::keep(LastWords::alive(false));
-    let (link, radio, flash) = board.take();
-    let (mut keeper, news) = Keeper::open(flash);
+    let (mut keeper, news) = Keeper::open(board.flash());
     let (onboard, doubts) = boot(keeper.saved());
     defmt::info!("gleaner {=str} boots", env!("CARGO_PKG_VERSION"));
     if let Some(before) = before {
@@ -66,10 +58,10 @@ pub fn fly<B: Board>(board: B) -> ! {
     if let Some(news) = news {
         onboard.say(Severity::Warning, format_args!("{news}"));
     }
-    let mut runtime = Runtime::new(onboard, link, radio);
+    let mut runtime = Runtime::new(onboard, lines::link(), lines::radio());
     B::start_watchdog();
     loop {
-        if runtime.pass(now(), B::losses(), &mut Defmt) {
+        if runtime.pass(now(), lines::losses(), &mut Defmt) {
             B::feed_watchdog();
             let onboard = runtime.onboard();
             fault::keep(LastWords::alive(matches!(onboard.state(), State::Engaged | State::Homing)));
@@ -106,9 +98,12 @@ impl fmt::Display for Doubt {
 fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<Engine>>, Vec<Doubt, 3>) {
     let mut doubts = Vec::new();
     let mut engine = Engine(None);
+    let (Some(workspace), Some(place)) = (WORKSPACE.try_take(), ONBOARD.try_uninit()) else {
+        fault::end(Cause::Panic { line: line!() })
+    };
     let tested = match Model::read(flash::model()) {
         Ok(model) => {
-            let mut policy = NativePolicy::new(model, WORKSPACE.take());
+            let mut policy = NativePolicy::new(model, workspace);
             let tested = self_test(&mut policy, model.goldens());
             if tested.is_err() {
                 let _ = doubts.push(Doubt::SelfTest);
@@ -136,7 +131,7 @@ fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<Engine>>, Vec<Do
     let Some(mission) = mission.or_else(nowhere) else { fault::end(Cause::Panic { line: line!() }) };
     let engine = Timed::new(engine, now);
     match Onboard::new(mission, parameters.clone(), Settings::default(), engine, tested) {
-        Ok(onboard) => (ONBOARD.init(onboard), doubts),
+        Ok(onboard) => (place.write(onboard), doubts),
         Err(_) => fault::end(Cause::Panic { line: line!() }),
     }
 }

@@ -1,7 +1,8 @@
 //! defmt on a serial port that never waits: a frame that finds no room is dropped whole and counted.
 #![allow(unsafe_code)]
 
-use crate::{Journal, Port, PortStats};
+use super::lines::{LOG, gleaner_wake_log};
+use crate::{Journal, PortStats};
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicU32, Ordering};
 use critical_section::{CriticalSection, Mutex, RestoreState};
@@ -9,14 +10,6 @@ use defmt::Encoder;
 use gleaner_pilot::{Decision, State};
 use gleaner_units::Duration;
 use heapless::Vec;
-
-/// The port of the log. It hears nothing.
-pub static LOG: Port<1, 1024> = Port::new();
-
-unsafe extern "Rust" {
-    /// Makes the interrupt of the log's UART run soon. Each board defines it.
-    safe fn gleaner_wake_log();
-}
 
 /// The longest frame.
 const FRAME_BYTES: usize = 256;

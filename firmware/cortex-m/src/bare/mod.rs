@@ -4,10 +4,12 @@
 mod fault;
 mod flash;
 mod fly;
+mod lines;
 mod log;
 mod time;
 
 pub use fault::end;
+pub use flash::{Refused, parameter_bytes, parameter_place};
 pub use fly::{Board, fly};
-pub use log::LOG;
+pub use lines::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
 pub use time::{now, start_clock};

@@ -22,10 +22,10 @@ struct Chip {
 }
 
 #[derive(Clone)]
-struct Double(Rc<RefCell<Chip>>);
+pub(crate) struct Double(Rc<RefCell<Chip>>);
 
 #[derive(Debug, PartialEq)]
-struct PowerGone;
+pub(crate) struct PowerGone;
 
 impl NorFlashError for PowerGone {
     fn kind(&self) -> NorFlashErrorKind {
@@ -54,13 +54,18 @@ impl Chip {
 }
 
 impl Double {
-    fn new() -> Double {
+    pub(crate) fn new() -> Double {
         let bytes = std::vec![0xFF; 2 * SECTOR];
         let written = std::vec![false; 2 * SECTOR / WORD];
         Double(Rc::new(RefCell::new(Chip { bytes, written, noise: 1, ..Chip::default() })))
     }
 
-    fn power_for(&self, operations: Option<usize>) {
+    /// Operations done so far, whole or not.
+    pub(crate) fn operations(&self) -> usize {
+        self.0.borrow().operations
+    }
+
+    pub(crate) fn power_for(&self, operations: Option<usize>) {
         self.0.borrow_mut().power_for = operations;
     }
 }

@@ -3,7 +3,8 @@
 //! Program and flash share one bank: while a sector is erased the processor stands still at its next fetch, for a
 //! quarter of a second, at most half of one. A word takes 16 microseconds.
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use gleaner_cortex_m::bare::{Refused, parameter_bytes, parameter_place};
 use stm32f4::stm32f405::FLASH;
 
 const SECTOR_BYTES: usize = 16 * 1024;
@@ -13,34 +14,15 @@ const FIRST_SECTOR: u8 = 1;
 /// Turns of a waiting loop: some seconds, were it ever to wait here and not at a fetch.
 const PATIENCE: u32 = 50_000_000;
 
-unsafe extern "C" {
-    /// Where the sectors begin, from the memory map.
-    static _parameters_start: u8;
-}
-
 /// Two sectors of flash.
 pub struct ParameterSectors {
     registers: FLASH,
-}
-
-/// The flash does not do what it was told.
-#[derive(Clone, Copy, Debug)]
-pub struct Refused;
-
-impl NorFlashError for Refused {
-    fn kind(&self) -> NorFlashErrorKind {
-        NorFlashErrorKind::Other
-    }
 }
 
 impl ParameterSectors {
     /// The sectors, with the registers that write them.
     pub const fn new(registers: FLASH) -> ParameterSectors {
         ParameterSectors { registers }
-    }
-
-    fn start() -> *mut u8 {
-        (&raw const _parameters_start).cast_mut()
     }
 
     /// Runs one operation between unlocking and locking. `prepare` sets what it is to be; a control register that
@@ -86,16 +68,7 @@ impl ReadNorFlash for ParameterSectors {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Refused> {
-        let offset = offset as usize;
-        if offset.saturating_add(bytes.len()) > self.capacity() {
-            return Err(Refused);
-        }
-        for (index, byte) in bytes.iter_mut().enumerate() {
-            // SAFETY: inside the sectors, as checked above; they are always readable, and volatile because flash
-            // changes under the compiler's feet.
-            *byte = unsafe { ParameterSectors::start().add(offset + index).read_volatile() };
-        }
-        Ok(())
+        parameter_bytes(offset, bytes)
     }
 
     fn capacity(&self) -> usize {
@@ -122,14 +95,10 @@ impl NorFlash for ParameterSectors {
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refused> {
-        let offset = offset as usize;
-        if !offset.is_multiple_of(4) || offset.saturating_add(bytes.len()) > self.capacity() {
-            return Err(Refused);
-        }
-        for (index, word) in bytes.chunks_exact(4).enumerate() {
-            let word = word.first_chunk().map_or(u32::MAX, |bytes| u32::from_le_bytes(*bytes));
-            // SAFETY: a word inside the sectors, as checked above, where only parameters stand.
-            let place = unsafe { ParameterSectors::start().add(offset + index * 4).cast::<u32>() };
+        for (index, four) in bytes.chunks_exact(4).enumerate() {
+            let word = four.first_chunk().map_or(u32::MAX, |bytes| u32::from_le_bytes(*bytes));
+            let place = parameter_place(offset + index as u32 * 4)?;
+            // SAFETY: a word inside the sectors, where only parameters stand.
             self.operate(WORDS | PROGRAM, |_| unsafe { place.write_volatile(word) })?;
         }
         Ok(())

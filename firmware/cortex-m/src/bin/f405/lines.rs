@@ -1,25 +1,9 @@
 //! The three serial lines: pins, speeds, interrupts.
 
 use cortex_m::peripheral::NVIC;
-use gleaner_cortex_m::bare::LOG;
-use gleaner_cortex_m::{LineFault, Port, Uart};
+use gleaner_cortex_m::bare::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
+use gleaner_cortex_m::{LineFault, Uart};
 use stm32f4::stm32f405::{Interrupt, Peripherals, UART4, USART2, USART3, interrupt};
-
-/// 22 ms of a line that is never silent.
-pub const LINK_IN: usize = 2048;
-/// Three frames.
-pub const LINK_OUT: usize = 512;
-/// 44 ms of a line that is never silent.
-pub const RADIO_IN: usize = 512;
-
-/// To the autopilot.
-pub static LINK: Port<LINK_IN, LINK_OUT> = Port::new();
-/// To the radio, which is never answered.
-pub static RADIO: Port<RADIO_IN, 1> = Port::new();
-
-const LINK_BAUD: u32 = 921_600;
-const RADIO_BAUD: u32 = 115_200;
-const LOG_BAUD: u32 = 115_200;
 
 /// Alternate function of USART2 and USART3.
 const AF_USART_1_TO_3: u32 = 7;
@@ -61,14 +45,9 @@ const fn divider(bus_hz: u32, baud: u32) -> u16 {
     ((bus_hz + baud / 2) / baud) as u16
 }
 
-/// Makes the link's interrupt run soon.
-pub fn wake_link() {
+#[unsafe(no_mangle)]
+fn gleaner_wake_link() {
     NVIC::pend(Interrupt::USART2);
-}
-
-/// Makes the radio's interrupt run soon.
-pub fn wake_radio() {
-    NVIC::pend(Interrupt::USART3);
 }
 
 #[unsafe(no_mangle)]

@@ -16,7 +16,7 @@ mod lines;
 use crate::flash::ParameterSectors;
 use cortex_m_rt::{entry, exception};
 use gleaner_cortex_m::bare::{self, Board};
-use gleaner_cortex_m::{Cause, Endpoint, PortStats, ResetFlags};
+use gleaner_cortex_m::{Cause, ResetFlags};
 use stm32f4::stm32f405::{IWDG, Peripherals};
 
 struct F405 {
@@ -25,17 +25,10 @@ struct F405 {
 }
 
 impl Board for F405 {
-    type Link = Endpoint<'static, { lines::LINK_IN }, { lines::LINK_OUT }>;
-    type Radio = Endpoint<'static, { lines::RADIO_IN }, 1>;
     type Flash = ParameterSectors;
 
-    fn take(self) -> (Self::Link, Self::Radio, Self::Flash) {
-        let link = Endpoint::new(&lines::LINK, lines::wake_link);
-        (link, Endpoint::new(&lines::RADIO, lines::wake_radio), self.flash)
-    }
-
-    fn losses() -> [PortStats; 2] {
-        [lines::LINK.stats(), lines::RADIO.stats()]
+    fn flash(self) -> ParameterSectors {
+        self.flash
     }
 
     fn reset_flags(&self) -> ResetFlags {
