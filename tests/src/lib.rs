@@ -3,5 +3,6 @@
 //! # Glossary
 //! - **judge**: a program that is not ours and says whether ours is right.
 
+pub mod board;
 pub mod programs;
 pub mod python;

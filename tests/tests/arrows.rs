@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Folder and rank of every member.
-const RANKS: [(&str, u8); 12] = [
+const RANKS: [(&str, u8); 13] = [
     ("firmware/units", 0),
     ("firmware/ports", 0),
     ("firmware/guard", 1),
@@ -15,6 +15,7 @@ const RANKS: [(&str, u8); 12] = [
     ("firmware/radio", 1),
     ("firmware/pilot", 2),
     ("firmware/companion", 3),
+    ("firmware/cortex-m", 3),
     ("sitl/world", 1),
     ("sitl/harness", 3),
     ("host-trainer", 3),

@@ -2,6 +2,7 @@
 
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
+use gleaner_policy::native::WeightFormat;
 use gleaner_ports::Endpoint;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,6 +28,21 @@ pub enum Command {
         #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=3600))]
         wait_s: u64,
     },
+    /// Convert a model for the native engine, and let it prove itself there.
+    Convert(Conversion),
+}
+
+/// A model to convert.
+#[derive(Args)]
+pub struct Conversion {
+    /// The trained policy (.onnx).
+    pub model: PathBuf,
+    /// The file to write (.gln).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// How weights are stored: f32, i8 or i16.
+    #[arg(long, value_name = "FORMAT", default_value = "f32", value_parser = weights)]
+    pub weights: WeightFormat,
 }
 
 /// Where everything is. A flag overrides the configuration file; its paths are relative to the current folder.
@@ -53,6 +69,10 @@ pub struct Setup {
     pub log_dir: Option<PathBuf>,
 }
 
+fn weights(name: &str) -> Result<WeightFormat, String> {
+    WeightFormat::from_name(name).ok_or_else(|| "it must be f32, i8 or i16".into())
+}
+
 /// Reads the command line of this process.
 ///
 /// # Errors
@@ -72,7 +92,7 @@ fn answer(error: &clap::Error) -> ExitCode {
             ExitCode::SUCCESS
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            eprintln!("gleaner: nothing to do: give a command, `gleaner run` or `gleaner check`, or --help");
+            eprintln!("gleaner: nothing to do: give a command, for example `gleaner check`, or --help");
             ExitCode::from(2)
         }
         _ => {

@@ -3,7 +3,7 @@
 use crate::config::ConfigError;
 use gleaner_pilot::OnboardError;
 use gleaner_pilot::mission_file::MissionFileError;
-use gleaner_policy::onnx::ModelError;
+use gleaner_policy::onnx::{ConvertError, ModelError};
 use gleaner_ports::PortError;
 use std::io;
 use std::path::PathBuf;
@@ -47,6 +47,22 @@ pub enum StartError {
         path: PathBuf,
         /// What.
         source: ModelError,
+    },
+    /// The model has no form for the native engine.
+    #[error("model {}: {source}", .path.display())]
+    Convert {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: ConvertError,
+    },
+    /// A result cannot be written.
+    #[error("{}: cannot be written: {source}: give another path with --out, or its permissions", .path.display())]
+    Write {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
     },
     /// The decision log cannot be written.
     #[error("decision log {}: {source}: give another folder with --log, or its permissions", .path.display())]

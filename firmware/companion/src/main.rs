@@ -10,6 +10,7 @@ mod args;
 mod check;
 mod clock;
 mod config;
+mod convert;
 mod error;
 mod load;
 mod log;
@@ -22,6 +23,7 @@ fn main() -> ExitCode {
     let outcome = match args::parse() {
         Ok(args::Command::Run(setup)) => run::run(&setup),
         Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
+        Ok(args::Command::Convert(conversion)) => convert::convert(&conversion),
         Err(answered) => return answered,
     };
     outcome.unwrap_or_else(|error| {

@@ -16,22 +16,27 @@ impl DistanceField {
     pub(crate) fn new(fence: &CellSet, terminal: Cell) -> DistanceField {
         let mut field = DistanceField { grid: fence.grid(), moves: [UNREACHED; MAX_CELLS] };
         // Every cell enters the queue at most once, so it cannot overflow.
-        let mut queue = [terminal; MAX_CELLS];
+        let mut queue = [0_u16; MAX_CELLS];
+        let Some(first) = field.grid.index(terminal) else { return field };
+        queue[0] = first as u16;
         let (mut head, mut tail) = (0, 1);
         field.set(terminal, 0);
         while head < tail {
-            let Some(&cell) = queue.get(head) else { break };
+            let Some(cell) = queue.get(head).and_then(|&index| field.grid.cell_at(index.into())) else {
+                break;
+            };
             head += 1;
             let Some(here) = field.at(cell) else { continue };
             for action in Action::MOVES {
                 let next = cell.after(action);
                 if fence.contains(next)
                     && field.at(next).is_none()
-                    && let Some(slot) = queue.get_mut(tail)
+                    && let (Some(slot), Some(index)) = (queue.get_mut(tail), field.grid.index(next))
                 {
-                    field.set(next, here.saturating_add(1));
-                    *slot = next;
+                    // Below MAX_CELLS, which fits.
+                    *slot = index as u16;
                     tail += 1;
+                    field.set(next, here.saturating_add(1));
                 }
             }
         }

@@ -2,7 +2,7 @@
 //! through the same [`Parameters::set`].
 
 use core::fmt;
-use gleaner_units::{BatteryUnits, Duration, Metres, MetresPerSecond};
+use gleaner_units::{BatteryUnits, Decimal, Duration, Metres, MetresPerSecond};
 
 /// Which parameter; the order is that of the index on the wire and never changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -183,7 +183,8 @@ impl fmt::Display for ParameterError {
             ParameterError::OutOfRange(id) => {
                 let spec = id.spec();
                 // Every bound prints exactly in tenths.
-                write!(f, "{} must be {}..{} {}", spec.name, spec.min, spec.max, spec.unit)
+                let (min, max) = (Decimal::<1>(spec.min), Decimal::<1>(spec.max));
+                write!(f, "{} must be {min:#}..{max:#} {}", spec.name, spec.unit)
             }
             ParameterError::NotWhole(id) => write!(f, "{} must be a whole number", id.spec().name),
         }

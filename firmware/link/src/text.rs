@@ -64,11 +64,12 @@ impl Texts {
         let least = self.waiting.iter().skip(1).map(|text| text.severity).max();
         let Some(least) = least.filter(|&least| least > severity) else { return false };
         let Some(last) = self.waiting.iter().rposition(|text| text.severity == least) else { return false };
-        let mut at = 0;
-        self.waiting.retain(|_| {
-            at += 1;
-            at - 1 != last
-        });
+        // Once around, without the one: `Deque::retain` can panic as far as a linker can tell.
+        for at in 0..self.waiting.len() {
+            if let Some(text) = self.waiting.pop_front().filter(|_| at != last) {
+                let _ = self.waiting.push_back(text);
+            }
+        }
         true
     }
 
@@ -102,7 +103,10 @@ fn chunk(text: &Text, id: u16, chunk_seq: u8) -> Option<Packet> {
     let rest = text.text.as_bytes().iter().skip(usize::from(chunk_seq) * CHUNK);
     let padded = rest.copied().chain(core::iter::repeat(0)).take(CHUNK);
     let [id_low, id_high] = id.to_le_bytes();
-    let payload: Vec<u8, { CHUNK + 4 }> =
-        [text.severity as u8].into_iter().chain(padded).chain([id_low, id_high, chunk_seq]).collect();
+    let mut payload = Vec::<u8, { CHUNK + 4 }>::new();
+    for byte in [text.severity as u8].into_iter().chain(padded).chain([id_low, id_high, chunk_seq]) {
+        // It fits: as many bytes as were counted above.
+        let _ = payload.push(byte);
+    }
     Packet::from_payload(STATUSTEXT_DATA::ID, STATUSTEXT_DATA::EXTRA_CRC, &payload)
 }

@@ -27,7 +27,7 @@
 //! `gleaner-guard`.
 //!
 //! # Features
-//! `std` adds `mission_file`: mission files as TOML text.
+//! `std` adds `mission_file`: mission files as TOML text. [`mission_image`], the mission in flash, needs none.
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -47,6 +47,7 @@ mod machine;
 mod mission;
 #[cfg(feature = "std")]
 pub mod mission_file;
+pub mod mission_image;
 mod onboard;
 mod rc;
 mod standby;

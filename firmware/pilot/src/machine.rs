@@ -8,7 +8,7 @@ use crate::{
 use gleaner_guard::Guard;
 use gleaner_link::{Firmware, Parameters, Severity, SystemState};
 use gleaner_policy::{DeviceState, Policy, Preference};
-use gleaner_units::{BatteryUnits, Cell, Duration, Instant};
+use gleaner_units::{BatteryUnits, Cell, Decimal, Duration, Instant};
 
 /// A decision loop that is later than this is no loop any more: PX4 has left OFFBOARD by then
 /// (`COM_OF_LOSS_T` 1 s), and an aircraft at 20 m/s has flown a whole cell unwatched.
@@ -264,7 +264,10 @@ impl Machine {
         let w_data = inputs.parameters.data_weight();
         if self.w_data.is_some_and(|last| last != w_data) {
             self.preference_changes = self.preference_changes.saturating_add(1);
-            out.say(Severity::Info, format_args!("gleaner: preference w_data {w_data:.2}, next decision"));
+            out.say(
+                Severity::Info,
+                format_args!("gleaner: preference w_data {}, next decision", Decimal::<2>(w_data)),
+            );
         }
         self.w_data = Some(w_data);
     }
@@ -287,7 +290,7 @@ impl Machine {
         }
         let flies = matches!(state, State::Engaged | State::Homing);
         out.withdraw |= !flies && (before.commands() || before == State::Fault);
-        let percent = self.collected * 100.0;
+        let percent = Decimal::<0>(self.collected * 100.0);
         match &self.phase {
             Phase::Boot => {}
             Phase::Idle => out.say(Severity::Info, format_args!("gleaner: idle")),
@@ -302,10 +305,10 @@ impl Machine {
                 out.say(Severity::Warning, format_args!("gleaner: going home: {}", reason.text()));
             }
             Phase::Done { landed: false } => {
-                out.say(Severity::Notice, format_args!("gleaner: landing, {percent:.0} % collected"))
+                out.say(Severity::Notice, format_args!("gleaner: landing, {percent} % collected"))
             }
             Phase::Done { landed: true } => {
-                out.say(Severity::Notice, format_args!("gleaner: landed, {percent:.0} % collected"))
+                out.say(Severity::Notice, format_args!("gleaner: landed, {percent} % collected"))
             }
             Phase::Passive => {
                 out.say(Severity::Warning, format_args!("gleaner: passive, someone else has control"))

@@ -132,9 +132,13 @@ impl<P: Policy> Onboard<P> {
         // 0 is in the parameter's range.
         let _ = parameters.set_id(ParameterId::Enable, Enable::Off.value());
         let settings = gleaner_link::Settings::new(settings.system_id.unwrap_or(1), settings.component_id)?;
-        let ids: Vec<u16, MAX_DEVICES> = mission.devices.iter().map(|site| site.id).collect();
+        let mut ids: Vec<u16, MAX_DEVICES> = Vec::new();
+        for site in &mission.devices {
+            // The capacities are the same.
+            let _ = ids.push(site.id);
+        }
         let machine = Machine::new(mission, self_test.is_ok())?;
-        // The mission's check has found doubles already, and the capacities are the same.
+        // The mission's check has found doubles already.
         let devices = DeviceTable::new(&ids).map_err(|_| MissionError::DuplicateDevice { id: 0 })?;
         Ok(Onboard {
             machine,
@@ -258,7 +262,10 @@ impl<P: Policy> Onboard<P> {
 
     fn take_events(&mut self, now: Instant) -> Told {
         let mut told = Told::default();
-        told.ended.extend(self.refused.iter().copied());
+        for &refused in &self.refused {
+            // Two of eight at most.
+            let _ = told.ended.push(refused);
+        }
         self.refused.clear();
         while let Some(event) = self.link.next_event() {
             match event {
@@ -311,12 +318,16 @@ impl<P: Policy> Onboard<P> {
 
     fn device_states(&self, now: Instant) -> Vec<DeviceState, MAX_DEVICES> {
         let max_age = self.link.parameters().snr_age();
-        let state = |(index, site): (usize, &crate::DeviceSite)| DeviceState {
-            cell: site.cell,
-            remaining: self.devices.remaining(index).unwrap_or(site.data),
-            snr: self.devices.snr(index, now, max_age),
-        };
-        self.machine.mission().devices.iter().enumerate().map(state).collect()
+        let mut states = Vec::new();
+        for (index, site) in self.machine.mission().devices.iter().enumerate() {
+            // The capacities are the same.
+            let _ = states.push(DeviceState {
+                cell: site.cell,
+                remaining: self.devices.remaining(index).unwrap_or(site.data),
+                snr: self.devices.snr(index, now, max_age),
+            });
+        }
+        states
     }
 
     fn send(&mut self, now: Instant, out: &Outputs) {

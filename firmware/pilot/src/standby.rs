@@ -8,7 +8,7 @@ use crate::stream::Stream;
 use crate::{Inputs, Machine, Missing, Outputs, State, Vehicle};
 use gleaner_link::{Firmware, FlightMode, Severity};
 use gleaner_policy::Policy;
-use gleaner_units::{Cell, Duration, Instant, Ned};
+use gleaner_units::{Cell, Decimal, Duration, Instant, Ned};
 
 /// What is missing is told at most this often, so that a condition at its edge does not flood the link.
 const TELL_PERIOD: Duration = Duration::from_secs(1);
@@ -99,7 +99,11 @@ impl Machine {
                 let needed = way + self.guard.reserve();
                 out.say(
                     Severity::Warning,
-                    format_args!("gleaner: battery {:.1}, way home needs {:.1}", battery.0, needed.0),
+                    format_args!(
+                        "gleaner: battery {}, way home needs {}",
+                        Decimal::<1>(battery.0),
+                        Decimal::<1>(needed.0)
+                    ),
                 );
             }
             _ => out.say(Severity::Info, format_args!("gleaner: waiting: {}", missing.text())),

@@ -18,7 +18,8 @@
 //! after [`self_test`] passed with the model's own golden pairs.
 //!
 //! # Features
-//! `std` adds the tract engine, which loads the ONNX file on a host with an operating system.
+//! [`native`] is always there. `std` adds the tract engine, which loads the ONNX file on a host with an operating
+//! system, and the conversion of that file for the native engine.
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -29,6 +30,7 @@
 
 mod golden;
 mod inference;
+pub mod native;
 pub mod schema;
 mod situation;
 mod tokens;

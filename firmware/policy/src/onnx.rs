@@ -11,11 +11,13 @@
 //! [`INPUTS`] and [`OUTPUTS`], and this engine on this machine reproduced the golden pairs. The seal finds
 //! damage, not malice: whoever can write the file can seal it again.
 
+mod convert;
 mod engine;
 mod error;
 mod interface;
 mod metadata;
 
+pub use convert::{ConvertError, convert};
 pub use engine::{InferError, TractPolicy};
 pub use error::ModelError;
 pub use interface::{INPUTS, OUTPUTS, Port};

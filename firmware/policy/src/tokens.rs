@@ -53,7 +53,7 @@ impl Tokens {
             devices: Vec::new(),
         };
         let mut slots = Slots::new();
-        for (index, device) in devices.into_iter().enumerate() {
+        for (index, device) in (0..=u16::MAX).zip(devices) {
             let [east_m, north_m] = offset_m(device.cell);
             let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
             let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
@@ -68,7 +68,7 @@ impl Tokens {
                 replace_weakest(&mut tokens.devices, &mut slots, token, index);
             } else {
                 let _ = tokens.devices.push(token);
-                let _ = slots.push(index as u16);
+                let _ = slots.push(index);
             }
         }
         (tokens, slots)
@@ -88,19 +88,19 @@ fn replace_weakest(
     tokens: &mut Vec<[f32; DEVICE_FEATURES], K_MAX>,
     slots: &mut Slots,
     token: [f32; DEVICE_FEATURES],
-    index: usize,
+    index: u16,
 ) {
-    let weakest = tokens
-        .iter()
-        .enumerate()
+    let weakest = (0..K_MAX)
+        .zip(tokens.iter())
         .reduce(|worst, next| if precedes(next.1, worst.1) { worst } else { next })
         .filter(|(_, weakest)| precedes(&token, weakest))
         .map(|(slot, _)| slot);
-    if let Some(slot) = weakest {
+    // Both lists are as long as each other; without saying so, a panic would stay in the image.
+    if let Some(slot) = weakest.filter(|&slot| slot < tokens.len() && slot < slots.len()) {
         tokens.remove(slot);
         slots.remove(slot);
         let _ = tokens.push(token);
-        let _ = slots.push(index as u16);
+        let _ = slots.push(index);
     }
 }
 

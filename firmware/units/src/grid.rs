@@ -137,11 +137,11 @@ impl Grid {
     /// The cell with this index; `None` at or above [`Grid::len`].
     #[must_use]
     pub const fn cell_at(&self, index: usize) -> Option<Cell> {
-        if index < self.len() {
-            let width = self.width as usize;
-            Some(Cell { x: (index % width) as i16, y: (index / width) as i16 })
-        } else {
-            None
+        let width = self.width as usize;
+        // No side is zero; checked all the same, so that no panic is left for the linker to find.
+        match (index.checked_rem(width), index.checked_div(width)) {
+            (Some(x), Some(y)) if index < self.len() => Some(Cell { x: x as i16, y: y as i16 }),
+            _ => None,
         }
     }
 

@@ -23,8 +23,12 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
+#[cfg(test)]
+extern crate std;
+
 mod action;
 mod cells;
+mod decimal;
 mod frame;
 mod grid;
 mod heights;
@@ -33,6 +37,7 @@ mod time;
 
 pub use action::{Action, ActionMask};
 pub use cells::CellSet;
+pub use decimal::Decimal;
 pub use frame::{GeoPoint, GridFrame, GridPoint, Ned};
 pub use grid::{Cell, Grid, GridError, MAX_CELLS};
 pub use heights::{CsvError, CsvFault, HeightMap};

@@ -1,5 +1,6 @@
-//! A whole mission in virtual time: the scripted operator, the simulation, and the pilot between them.
+//! A whole mission: the scripted operator, the simulation, and the pilot between them.
 
+use crate::aboard::Aboard;
 use crate::autopilot::CopterMode;
 use crate::mission::{PlanError, Staged};
 use crate::operator::{Operator, Orders, Switch};
@@ -50,6 +51,8 @@ pub enum IncidentKind {
     Voltage(f32),
     /// The pack loses charge.
     LosesBattery(BatteryUnits),
+    /// The autopilot's supply fails for a moment.
+    AutopilotReboots,
 }
 
 /// Why a flight could not be flown at all.
@@ -74,6 +77,8 @@ pub enum Ending {
     NeverEngaged,
     /// The time is up.
     TimeUp,
+    /// The pilot's computer is gone: its port is closed.
+    PilotGone,
 }
 
 /// A flight that is over.
@@ -85,8 +90,8 @@ pub struct Flown {
     pub wishes: Wishes,
     /// How it ended.
     pub ending: Ending,
-    /// What the pilot was doing at the end.
-    pub state: State,
+    /// What the pilot was doing at the end; `None` where it can only be heard.
+    pub state: Option<State>,
     /// Changes of the preference that were confirmed.
     pub switches: usize,
     /// When the first decision was made, since the autopilot's boot.
@@ -148,8 +153,8 @@ impl Figures {
     }
 }
 
-/// The pilot is polled at 50 Hz: the rate of the physics.
-const STEP: Duration = Duration::from_millis(20);
+/// One step of a flight: the rate of the physics, at which a pilot in this process is polled too.
+pub const STEP: Duration = Duration::from_millis(20);
 /// Estimator, climb and two heartbeats take under a minute.
 const ENGAGE_LIMIT: Duration = Duration::from_secs(180);
 /// After the motors have stopped, for the pilot to say so.
@@ -159,7 +164,96 @@ const TAKEN_LIMIT: Duration = Duration::from_secs(60);
 /// 500 battery units of hovering take 2000 s.
 const FLIGHT_LIMIT: Duration = Duration::from_secs(4000);
 
-/// Flies a mission from boot to landing. `self_test` is the result of the policy's self-test.
+/// A mission on its way: the simulation, the operator and whatever happens to the aircraft, one step at a time.
+#[derive(Debug)]
+pub struct Flight {
+    simulation: Simulation,
+    operator: Operator,
+    wishes: Wishes,
+    incidents_done: usize,
+    watch: Watch,
+    now: Instant,
+}
+
+impl Flight {
+    /// Everything at the autopilot's boot, for a pilot that is the component `component_id` of the vehicle.
+    ///
+    /// # Errors
+    /// See [`PlanError`].
+    pub fn new(staged: Staged, wishes: Wishes, component_id: u8) -> Result<Flight, PlanError> {
+        let mut parameters = staged.parameters();
+        parameters.push(("GLN_W_DATA", wishes.preference));
+        let operator = Operator::new(Orders {
+            station_id: 255,
+            system_id: staged.copter.system_id,
+            component_id,
+            parameters,
+            altitude_m: staged.altitude_m(),
+            engage: true,
+            switches: wishes.switches.clone(),
+        });
+        let simulation = Simulation::new(staged)?;
+        let watch = Watch::default();
+        Ok(Flight { simulation, operator, wishes, incidents_done: 0, watch, now: Instant::ZERO })
+    }
+
+    /// Lets [`STEP`] of the aircraft's life pass, with `pilot` on board; how the flight ended, once it has.
+    pub fn step(&mut self, pilot: &mut impl Aboard) -> Option<Ending> {
+        let now = self.now + STEP;
+        self.now = now;
+        let simulation = &mut self.simulation;
+        simulation.step(now);
+        for frame in simulation.to_ground() {
+            self.operator.receive(now, &frame);
+        }
+        for frame in self.operator.poll(now) {
+            simulation.hear_ground(&frame);
+        }
+        simulation.crew(&[]);
+        pilot.exchange(simulation, now);
+        self.let_happen(now);
+        self.watch.ending(&self.simulation, &self.operator)
+    }
+
+    fn let_happen(&mut self, now: Instant) {
+        let Some(engaged_at) = self.operator.engaged_at() else { return };
+        while let Some(incident) = self.wishes.incidents.get(self.incidents_done)
+            && now >= engaged_at + incident.after
+        {
+            self.incidents_done += 1;
+            happen(&mut self.simulation, incident.kind);
+        }
+    }
+
+    /// Everything around the pilot.
+    #[must_use]
+    pub const fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// The ground station.
+    #[must_use]
+    pub const fn operator(&self) -> &Operator {
+        &self.operator
+    }
+
+    /// The flight is over; `state` is what the pilot says of itself, where it can be asked.
+    #[must_use]
+    pub fn end(self, ending: Ending, state: Option<State>) -> Flown {
+        Flown {
+            state,
+            switches: self.operator.switched(),
+            engaged_at: self.operator.engaged_at(),
+            texts: self.operator.texts().to_vec(),
+            waiting_for: self.operator.waiting_for(),
+            simulation: self.simulation,
+            wishes: self.wishes,
+            ending,
+        }
+    }
+}
+
+/// Flies a mission from boot to landing, in virtual time. `self_test` is the result of the policy's self-test.
 ///
 /// # Errors
 /// See [`FlightError`]. A flight that goes wrong is no error: see [`Flown::figures`].
@@ -175,67 +269,11 @@ pub fn fly<P: Policy>(
     let settings = Settings::default();
     let onboard = Onboard::new(staged.mission.clone(), Parameters::default(), settings, policy, self_test);
     let mut onboard = onboard.map_err(FlightError::Onboard)?;
-    let mut parameters = staged.parameters();
-    parameters.push(("GLN_W_DATA", wishes.preference));
-    let mut operator = Operator::new(Orders {
-        station_id: 255,
-        system_id: staged.copter.system_id,
-        component_id: settings.component_id,
-        parameters,
-        altitude_m: staged.altitude_m(),
-        engage: true,
-        switches: wishes.switches.clone(),
-    });
-    let mut simulation = Simulation::new(staged)?;
-    let mut incidents = wishes.incidents.iter().peekable();
-    let mut watch = Watch::default();
-    let mut now = Instant::ZERO;
-    let ending = loop {
-        now = now + STEP;
-        simulation.step(now);
-        for frame in simulation.to_ground() {
-            operator.receive(now, &frame);
-        }
-        for frame in operator.poll(now) {
-            simulation.hear_ground(&frame);
-        }
-        simulation.crew(&[]);
-        exchange(&mut simulation, &mut onboard, now);
-        if let Some(engaged_at) = operator.engaged_at() {
-            while let Some(incident) = incidents.next_if(|incident| now >= engaged_at + incident.after) {
-                happen(&mut simulation, incident.kind);
-            }
-        }
-        if let Some(ending) = watch.ending(&simulation, &operator) {
-            break ending;
-        }
-    };
-    Ok(Flown {
-        state: onboard.state(),
-        switches: operator.switched(),
-        engaged_at: operator.engaged_at(),
-        texts: operator.texts().to_vec(),
-        waiting_for: operator.waiting_for(),
-        simulation,
-        wishes,
-        ending,
-    })
-}
-
-/// One poll of the pilot with everything that is due.
-pub(crate) fn exchange<P: Policy>(simulation: &mut Simulation, onboard: &mut Onboard<P>, now: Instant) {
-    for frame in simulation.to_companion() {
-        onboard.receive_link(now, &frame);
-    }
-    onboard.receive_radio(now, &simulation.radio());
-    onboard.poll(now);
-    let mut buffer = [0; 512];
+    let mut flight = Flight::new(staged, wishes, settings.component_id)?;
     loop {
-        let length = onboard.transmit(&mut buffer);
-        if length == 0 {
-            break;
+        if let Some(ending) = flight.step(&mut onboard) {
+            return Ok(flight.end(ending, Some(onboard.state())));
         }
-        simulation.hear_companion(&buffer[..length]);
     }
 }
 
@@ -245,6 +283,7 @@ fn happen(simulation: &mut Simulation, kind: IncidentKind) {
         IncidentKind::PilotSelects(mode) => copter.pilot_selects(mode),
         IncidentKind::Voltage(volts) => copter.set_voltage(volts),
         IncidentKind::LosesBattery(units) => copter.lose_battery(units),
+        IncidentKind::AutopilotReboots => copter.reboot(),
         IncidentKind::Fence(radius_m) => {
             for (name, value) in [("FENCE_TYPE", 2.0), ("FENCE_RADIUS", radius_m), ("FENCE_ENABLE", 1.0)] {
                 copter.set_parameter(name, value);
@@ -254,7 +293,7 @@ fn happen(simulation: &mut Simulation, kind: IncidentKind) {
 }
 
 /// Looks for the end.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Watch {
     taken_since: Option<Instant>,
     grounded_since: Option<Instant>,

@@ -1,7 +1,8 @@
 //! What happened: the track, the slots, the frames; and their files.
 
 use crate::autopilot::Truth;
-use gleaner_pilot::DecisionRecord;
+use gleaner_pilot::{DecisionRecord, Mission};
+use gleaner_policy::{DeviceState, Preference, Situation, Slots, Tokens};
 use gleaner_units::{Duration, Instant, Ned};
 use gleaner_world::Serving;
 use serde::Serialize;
@@ -16,12 +17,32 @@ pub struct Slot {
     pub position: Ned,
     /// What the pilot said.
     pub record: DecisionRecord,
+    /// The devices as the radio reported them for this slot, in the mission's order.
+    pub heard: Vec<DeviceState>,
     /// Whether it was flown: shadow decisions are not.
     pub flown: bool,
     /// What the slot brought.
     pub serving: Option<Serving>,
     /// Fraction of the data collected so far.
     pub collected: f32,
+}
+
+impl Slot {
+    /// The observation that the pilot must have had: what it says of cell, battery and preference, what the radio
+    /// reported, and the mission. `None` if its preference is impossible. So a decision that was made elsewhere can be
+    /// made again here, and no pilot is asked what it saw.
+    #[must_use]
+    pub fn observation(&self, mission: &Mission) -> Option<(Tokens, Slots)> {
+        let situation = Situation {
+            cell: self.record.cell,
+            battery: self.record.battery,
+            spare: self.record.spare,
+            terminal: mission.terminal,
+            preference: Preference::new(self.record.w_data)?,
+            heights: &mission.heights,
+        };
+        Some(Tokens::build(&situation, self.heard.iter().copied()))
+    }
 }
 
 /// A point of the track.
@@ -74,6 +95,11 @@ impl Journal {
     #[must_use]
     pub fn slots(&self) -> &[Slot] {
         &self.slots
+    }
+
+    /// The frames of companion, autopilot and ground station, in order, each with the time since the autopilot's boot.
+    pub fn frames(&self) -> impl Iterator<Item = (Instant, &[u8])> {
+        self.frames.iter().map(|(at, frame)| (*at, frame.as_slice()))
     }
 
     /// Writes the frames as a telemetry log: for each the time in microseconds since 1970 as eight big-endian bytes,

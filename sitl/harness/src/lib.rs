@@ -1,7 +1,8 @@
 //! Simulated autopilot, radio and city around the *unchanged* pilot, and the program `gleaner-sitl`.
 //!
-//! Everything below the program runs on virtual time and in one process: a mission of ten minutes takes a
-//! fraction of a second, and the same seed gives the same bytes.
+//! With the pilot in this process everything below the program runs on virtual time: a mission of ten minutes takes a
+//! fraction of a second, and the same seed gives the same bytes. A pilot behind byte streams ([`Wired`]: a board, an
+//! emulator, a companion computer) keeps its own clock, so the world keeps pace with the wall ([`Pace`]).
 //!
 //! ```text
 //!  Operator --bytes--> +--------------------- Simulation ----------------------+ --bytes--> Onboard
@@ -19,6 +20,7 @@
 //! - **staged**: a mission laid out, before anything moves ([`Staged`]).
 //! - **operator**: the scripted ground station ([`Operator`]).
 //! - **incident**: something that happens to the aircraft during a flight.
+//! - **haste**: how many seconds the aircraft lives while its pilot's clock counts one.
 //!
 //! # When you may trust it
 //! The pilot inside [`fly`] is the crate `gleaner-pilot` as it runs on board, and it sees nothing but bytes and the
@@ -27,24 +29,30 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod aboard;
 mod autopilot;
 mod flight;
 mod journal;
 mod mission;
 mod modem;
 mod operator;
+mod pace;
 mod picture;
 pub mod program;
 mod referee;
 mod simulation;
 mod wire;
+mod wired;
 
+pub use aboard::Aboard;
 pub use autopilot::{Copter, CopterMode, CopterSettings, LinkId, Pack, Truth};
-pub use flight::{Ending, Figures, FlightError, Flown, Incident, IncidentKind, Wishes, fly};
+pub use flight::{Ending, Figures, Flight, FlightError, Flown, Incident, IncidentKind, STEP, Wishes, fly};
 pub use journal::{Journal, Slot, TrackPoint};
 pub use mission::{MissionPlan, PlanError, Staged};
 pub use modem::{Modem, device_id};
 pub use operator::{Operator, Orders, Switch};
+pub use pace::Pace;
 pub use picture::trajectory;
 pub use referee::{Breach, Referee, Violation};
 pub use simulation::Simulation;
+pub use wired::{Wired, fly_wired};

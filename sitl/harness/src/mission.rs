@@ -15,6 +15,8 @@ const CORNER: GeoPoint = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_
 const STAND: Ned = Ned { north_m: 12.0, east_m: -7.0, down_m: 0.5 };
 /// `GLN_SPEED`, by default the autopilot's `WPNAV_SPEED`.
 const CRUISE: MetresPerSecond = MetresPerSecond(10.0);
+/// The highest `GLN_SPEED`, for an aircraft in haste: a slot of hovering then lasts a second.
+const TOP_SPEED: MetresPerSecond = MetresPerSecond(20.0);
 /// Flight altitude: the world's channel is computed for it.
 const ALTITUDE_M: f32 = gleaner_world::City::ALTITUDE_M as f32;
 
@@ -33,13 +35,17 @@ pub struct MissionPlan {
     pub reserve: BatteryUnits,
     /// Standard deviation of the position estimate's wander, m.
     pub wander_m: f32,
+    /// How many seconds the aircraft lives while its pilot's clock counts one. A pilot in this process shares the
+    /// aircraft's clock: 1. An emulated board keeps the wall's, and nobody waits ten minutes for a flight.
+    pub haste: f32,
 }
 
 impl MissionPlan {
     /// The default scenario of a kind.
     #[must_use]
     pub const fn new(kind: ScenarioKind, seed: u64) -> MissionPlan {
-        MissionPlan { kind, seed, devices: None, battery: None, reserve: BatteryUnits(0.0), wander_m: 0.0 }
+        let reserve = BatteryUnits(0.0);
+        MissionPlan { kind, seed, devices: None, battery: None, reserve, wander_m: 0.0, haste: 1.0 }
     }
 }
 
@@ -108,7 +114,9 @@ impl Staged {
         let north_m = (f32::from(start.y) + 0.5) * cell_m - STAND.north_m;
         let east_m = (f32::from(start.x) + 0.5) * cell_m - STAND.east_m;
         let origin = CORNER.offset_by(Metres(north_m), Metres(east_m));
-        let pack = Pack::new(capacity);
+        let mut pack = Pack::new(capacity);
+        // A slot of hovering is a time on the pilot's clock: it must not cost the aircraft more for its haste.
+        pack.hover_per_s /= plan.haste;
         let (wander_m, seed) = (plan.wander_m, plan.seed);
         let copter = CopterSettings { system_id: 1, origin, stand: STAND, pack, wander_m, seed };
         let frame = GridFrame::new(grid, CORNER, origin);
@@ -146,7 +154,7 @@ impl Staged {
             ("GLN_BAT_UNITS", self.copter.pack.capacity.0),
             ("GLN_RESERVE", self.plan.reserve.0),
             ("GLN_ALT", ALTITUDE_M),
-            ("GLN_SPEED", CRUISE.0),
+            ("GLN_SPEED", if self.plan.haste > 1.0 { TOP_SPEED.0 } else { CRUISE.0 }),
         ]
     }
 

@@ -10,13 +10,13 @@
 //! gives nothing away: between here and there nothing is decided, the next decision is made on arrival, and what the
 //! modem says of that cell is then simply up to date.
 
-use gleaner_radio::{Report, encode};
+use gleaner_radio::Report;
 use gleaner_units::{Action, Cell, Duration, Instant};
-use gleaner_world::{Field, Realization, ScenarioError, Seed, Serving, Stream, World};
+use gleaner_world::{Device, Field, Realization, ScenarioError, Seed, Serving, Stream, World};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// Time between two rounds of reports.
+/// Time between two rounds of reports, on the pilot's clock.
 const ROUND: Duration = Duration::from_millis(200);
 
 /// The modem and the devices that it hears.
@@ -26,6 +26,7 @@ pub struct Modem {
     field: Field,
     rng: ChaCha8Rng,
     cell: Cell,
+    round: Duration,
     next_round: Instant,
 }
 
@@ -44,7 +45,14 @@ impl Modem {
         let mut field = Field::new(&world, realization)?;
         let mut rng = seed.rng(Stream::Slots);
         field.listen(&world, realization.start(), &mut rng);
-        Ok(Modem { world, field, rng, cell: realization.start(), next_round: Instant::ZERO })
+        let cell = realization.start();
+        Ok(Modem { world, field, rng, cell, round: ROUND, next_round: Instant::ZERO })
+    }
+
+    /// The same for a pilot whose clock counts one second while `haste` seconds pass here.
+    #[must_use]
+    pub fn with_haste(self, haste: f32) -> Modem {
+        Modem { round: Duration::from_secs_f32(ROUND.as_secs_f32() * haste), ..self }
     }
 
     /// One slot: serves at `cell`, then hears the devices at the cell that `action` leads to. Reports follow at once.
@@ -66,26 +74,21 @@ impl Modem {
         }
     }
 
-    /// The bytes of the reports that are due: all devices that are heard at all, at 5 Hz.
-    pub fn reports(&mut self, now: Instant) -> Vec<u8> {
+    /// The reports that are due: all devices that are heard at all, at 5 Hz.
+    pub fn reports(&mut self, now: Instant) -> Vec<Report> {
         if now < self.next_round {
             return Vec::new();
         }
-        self.next_round = now + ROUND;
-        let mut bytes = Vec::new();
-        for (index, device) in self.field.devices().iter().enumerate() {
-            // Outside the city nothing is heard.
-            if device.snr.0.is_finite() {
-                let remaining = Some(device.remaining_units);
-                bytes.extend(encode(&Report {
-                    device: device_id(index),
-                    snr: device.snr,
-                    remaining,
-                    age_ms: 0,
-                }));
-            }
-        }
-        bytes
+        self.next_round = now + self.round;
+        let heard = self.field.devices().iter().enumerate().filter(|(_, device)| device.snr.0.is_finite());
+        let report = |(index, device): (usize, &Device)| Report {
+            device: device_id(index),
+            snr: device.snr,
+            remaining: Some(device.remaining_units),
+            age_ms: 0,
+        };
+        // Outside the city nothing is heard.
+        heard.map(report).collect()
     }
 
     /// What the devices hold.
@@ -98,7 +101,6 @@ impl Modem {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_radio::ReportDecoder;
     use gleaner_world::{Episode, Scenario};
 
     fn setup() -> (Arc<World>, Realization) {
@@ -126,20 +128,15 @@ mod tests {
     fn reports_carry_what_is_heard_at_5_hz_and_at_once_after_a_slot() {
         let (world, realization) = setup();
         let mut modem = Modem::new(world, &realization, Seed::evaluation(3)).unwrap();
-        let decode = |bytes: &[u8]| {
-            let mut reports = Vec::new();
-            ReportDecoder::new().push(bytes, |report| reports.push(report));
-            reports
-        };
-        let reports = decode(&modem.reports(Instant::from_millis(20)));
+        let reports = modem.reports(Instant::from_millis(20));
         assert_eq!(reports.len(), 6);
         for (report, device) in reports.iter().zip(modem.field().devices()) {
             assert_eq!((report.snr, report.remaining), (device.snr, Some(device.remaining_units)));
         }
         assert!(modem.reports(Instant::from_millis(200)).is_empty());
-        assert_eq!(decode(&modem.reports(Instant::from_millis(220))).len(), 6);
+        assert_eq!(modem.reports(Instant::from_millis(220)).len(), 6);
         modem.slot(realization.start(), Action::East);
-        assert_eq!(decode(&modem.reports(Instant::from_millis(240))).len(), 6);
+        assert_eq!(modem.reports(Instant::from_millis(240)).len(), 6);
         modem.carry_to(Cell::new(-1, 3));
         assert!(modem.reports(Instant::from_millis(900)).is_empty(), "outside the city");
     }

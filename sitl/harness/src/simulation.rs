@@ -8,6 +8,8 @@ use crate::referee::Referee;
 use crate::wire::{parse, relayed};
 use gleaner_link::{Frame, FrameDecoder, Message, TUNNEL_DECISION};
 use gleaner_pilot::DecisionRecord;
+use gleaner_policy::DeviceState;
+use gleaner_radio::Report;
 use gleaner_units::{Instant, Ned};
 use gleaner_world::Field;
 use mavlink::MessageData;
@@ -37,6 +39,7 @@ impl Simulation {
     /// See [`PlanError`].
     pub fn new(staged: Staged) -> Result<Simulation, PlanError> {
         let modem = Modem::new(staged.world.clone(), &staged.realization, staged.seed())?;
+        let modem = modem.with_haste(staged.plan.haste);
         let guard = staged.mission.guard(staged.plan.reserve)?;
         let referee = Referee::new(&staged.mission, guard, staged.frame, staged.plan.wander_m);
         Ok(Simulation {
@@ -124,8 +127,8 @@ impl Simulation {
         self.copter.transmit(LinkId::CREW)
     }
 
-    /// Report bytes from the radio modem that are due.
-    pub fn radio(&mut self) -> Vec<u8> {
+    /// Reports from the radio modem that are due.
+    pub fn radio(&mut self) -> Vec<Report> {
         self.modem.reports(self.now)
     }
 
@@ -149,10 +152,31 @@ impl Simulation {
     fn decided(&mut self, record: DecisionRecord) {
         let truth = self.copter.truth();
         let flown = self.referee.hear_decision(self.now, &record, &truth);
+        let heard = self.heard();
         let serving = flown.then(|| self.modem.slot(record.cell, record.action)).flatten();
         self.deciding |= flown;
         let collected = self.modem.field().collected_fraction();
-        self.journal.slot(Slot { at: self.now, position: truth.position, record, flown, serving, collected });
+        self.journal.slot(Slot {
+            at: self.now,
+            position: truth.position,
+            record,
+            heard,
+            flown,
+            serving,
+            collected,
+        });
+    }
+
+    /// The devices as the modem last reported them.
+    fn heard(&self) -> Vec<DeviceState> {
+        let devices = self.modem.field().devices().iter();
+        devices
+            .map(|device| DeviceState {
+                cell: device.cell,
+                remaining: device.remaining_units,
+                snr: Some(device.snr).filter(|snr| snr.0.is_finite()),
+            })
+            .collect()
     }
 
     /// The simulated autopilot, for injections.

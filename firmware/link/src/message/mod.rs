@@ -177,8 +177,12 @@ impl Message {
             dialect::PARAM_REQUEST_READ_DATA::ID => parameter::read_request(fields, frame.payload())?,
             dialect::PARAM_SET_DATA::ID => parameter::read_set(fields, frame.payload())?,
             dialect::STATUSTEXT_DATA::ID => {
-                let text = frame.payload().get(1..).unwrap_or(&[]);
-                let text = text.iter().copied().take(50).take_while(|&byte| byte != 0).collect();
+                let sent = frame.payload().get(1..).unwrap_or(&[]);
+                let mut text = Vec::new();
+                for byte in sent.iter().copied().take(50).take_while(|&byte| byte != 0) {
+                    // It fits: 50 is its capacity.
+                    let _ = text.push(byte);
+                }
                 Message::StatusText { severity: fields.u8(0), text }
             }
             dialect::TIMESYNC_DATA::ID => {
@@ -218,10 +222,14 @@ fn read_tunnel(fields: Fields<'_>, payload: &[u8]) -> Result<Message, MessageFau
         return Err(MessageFault::Malformed);
     }
     let sent = payload.get(HEADER..).unwrap_or(&[]);
-    let padded = sent.iter().copied().chain(core::iter::repeat(0)).take(length);
+    let mut padded = crate::TunnelPayload::new();
+    for byte in sent.iter().copied().chain(core::iter::repeat(0)).take(length) {
+        // It fits, as checked above.
+        let _ = padded.push(byte);
+    }
     Ok(Message::Tunnel {
         target: Address::new(fields.u8(2), fields.u8(3)),
         payload_type: fields.u16(0),
-        payload: padded.collect(),
+        payload: padded,
     })
 }

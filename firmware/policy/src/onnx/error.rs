@@ -1,6 +1,7 @@
 //! Why a model file is refused.
 
 use crate::SelfTestError;
+use crate::native::BlobError;
 
 /// Why a model file is refused: what, where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
@@ -66,6 +67,9 @@ pub enum ModelError {
     /// The engine cannot run the graph.
     #[error("tract cannot run the model ({0}): write it with `gleaner-train export`")]
     Engine(String),
+    /// The file of the native engine is not fit for it.
+    #[error("{0}")]
+    Blob(#[from] BlobError),
     /// The golden pairs are not reproduced.
     #[error("self-test failed: {0}: do not fly; export the model again, or report this machine")]
     SelfTest(#[from] SelfTestError),

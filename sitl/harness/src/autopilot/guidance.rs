@@ -44,6 +44,7 @@ const WANDER_TIME_S: f64 = 8.0;
 impl Copter {
     /// Lets time pass until `now`, in ticks of 20 ms.
     pub fn step(&mut self, now: Instant) {
+        let now = Instant::ZERO + (now - self.booted_at);
         while !self.killed_by_nan && self.now + TICK <= now {
             self.now = self.now + TICK;
             self.tick();

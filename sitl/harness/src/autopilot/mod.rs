@@ -17,7 +17,8 @@
 //! [`Copter::pilot_selects`], with centred sticks).
 //!
 //! # Time
-//! All times are this autopilot's clock, zero at its boot. [`Copter::step`] is the only thing that lets time pass.
+//! All times inside are this autopilot's clock, zero at its boot. [`Copter::step`] is the only thing that lets time
+//! pass; its argument counts from the first boot.
 
 mod battery;
 mod commands;
@@ -37,7 +38,7 @@ pub use mode::CopterMode;
 use crate::wire::Speaker;
 use battery::Battery;
 use gleaner_link::{Address, FrameDecoder};
-use gleaner_units::{BatteryUnits, GeoPoint, Instant, Ned};
+use gleaner_units::{BatteryUnits, Duration, GeoPoint, Instant, Ned};
 use guidance::Guidance;
 use mavlink::dialects::ardupilotmega::{MavSeverity, STATUSTEXT_DATA};
 use motion::Body;
@@ -45,6 +46,9 @@ use parameters::ParameterTable;
 use rand_chacha::ChaCha8Rng;
 use routing::Routes;
 use streams::Streams;
+
+/// From power on to the first heartbeat after a [`Copter::reboot`].
+const BOOT_TIME: Duration = Duration::from_secs(3);
 
 /// One of the autopilot's serial ports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -113,6 +117,8 @@ struct Link {
 #[derive(Debug)]
 pub struct Copter {
     settings: CopterSettings,
+    /// The last boot, on the clock that [`Copter::step`] is given.
+    booted_at: Instant,
     now: Instant,
     links: [Link; 3],
     routes: Routes,
@@ -152,6 +158,7 @@ impl Copter {
         let Ned { north_m, east_m, down_m } = settings.stand;
         Copter {
             settings,
+            booted_at: Instant::ZERO,
             now: Instant::ZERO,
             links: [link(), link(), link()],
             routes: Routes::default(),
@@ -212,6 +219,23 @@ impl Copter {
     /// The pack loses units: a weak cell.
     pub fn lose_battery(&mut self, units: BatteryUnits) {
         self.battery.lose(units);
+    }
+
+    /// The autopilot's supply fails for a moment: the motors stop, the aircraft drops where it is, and the autopilot
+    /// begins anew, with its parameters and nothing else: no mode, no home, no streams, nobody on its links.
+    pub fn reboot(&mut self) {
+        let [north, east, _] = self.body.position;
+        let ground = f64::from(self.settings.stand.down_m);
+        let fresh = Copter::new(self.settings);
+        let before = std::mem::replace(self, fresh);
+        self.booted_at = before.booted_at + (before.now - Instant::ZERO);
+        self.next_heartbeat = Instant::ZERO + BOOT_TIME;
+        self.body = Body::at([north, east, ground]);
+        self.parameters = before.parameters;
+        self.battery = before.battery;
+        (self.wander, self.rng) = (before.wander, before.rng);
+        self.ignored_targets = before.ignored_targets;
+        self.rc_dial_us = before.rc_dial_us;
     }
 
     /// Sets one of the autopilot's own parameters before the flight, as a ground crew would. Whether it exists.

@@ -253,6 +253,30 @@ fn not_a_number_ends_the_simulation() {
 }
 
 #[test]
+fn rebooted_it_lies_below_and_knows_nobody() {
+    let mut bench = Bench::flying();
+    bench.command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, [33.0, 1e5, 0.0, 0.0]);
+    bench.target(52.0, -7.0, -59.5);
+    bench.run(3.0);
+    let before = bench.copter.truth();
+    bench.copter.reboot();
+    bench.heard.clear();
+    bench.run(2.9);
+    assert!(bench.heard.is_empty(), "it boots");
+    bench.run(7.0);
+    let truth = bench.copter.truth();
+    assert!(truth.on_ground && !truth.armed && truth.mode == Mode::Stabilize);
+    assert_eq!((truth.position.north_m, truth.height_m), (before.position.north_m, 0.0));
+    assert_eq!(truth.battery, before.battery);
+    assert_eq!(bench.count(GLOBAL_POSITION_INT_DATA::ID), 0, "nobody has asked since");
+    assert!((7..=8).contains(&bench.count(HEARTBEAT_DATA::ID)));
+    bench.command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, [33.0, 1e5, 0.0, 0.0]);
+    bench.run(0.2);
+    let position = bench.all::<GLOBAL_POSITION_INT_DATA>().pop().unwrap();
+    assert!((9_000..11_000).contains(&position.time_boot_ms), "its clock began again: {position:?}");
+}
+
+#[test]
 fn low_battery_is_told_once_and_latched() {
     let mut bench = Bench::flying();
     bench.copter.set_voltage(10.3);

@@ -21,7 +21,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Fly one mission in virtual time, over real MAVLink bytes.
+    /// Fly one mission over real MAVLink bytes: in virtual time, or with a board in the wall's time.
     Fly(FlyArguments),
     /// Run in real time, with ports for a companion computer, its radio and a ground station.
     Serve(ServeArguments),
@@ -59,6 +59,19 @@ struct FlyArguments {
     /// Change the preference to W, T seconds after engaging. May be given several times.
     #[arg(long, value_name = "T:W", value_parser = switch)]
     switch: Vec<Switch>,
+    /// Fly with a pilot that is not in this process: a board, or QEMU with -serial tcp:HOST:PORT for the port that is
+    /// named here. udpin:HOST:PORT, udpout:, tcpin:, tcpout: or serial:PATH[:BAUD].
+    #[arg(long, value_name = "ENDPOINT", conflicts_with = "model")]
+    board: Option<Endpoint>,
+    /// Where the board's radio is plugged in; without it the reports come by TUNNEL on the first port.
+    #[arg(long, value_name = "ENDPOINT", requires = "board")]
+    radio: Option<Endpoint>,
+    /// How many seconds the aircraft lives while the board's clock, which nobody can hurry, counts one [default: 4].
+    #[arg(long, value_name = "FACTOR", requires = "board", value_parser = haste)]
+    haste: Option<f32>,
+    /// Write the mission file that the pilot needs, and the city next to it.
+    #[arg(long, value_name = "FILE")]
+    mission_out: Option<PathBuf>,
     /// Print one JSON object instead of a summary.
     #[arg(long)]
     json: bool,
@@ -111,26 +124,35 @@ pub(crate) enum Task {
     Serve(ServeOrder),
 }
 
-/// One mission in virtual time.
+/// One mission: in virtual time without a board.
 #[derive(Debug)]
 pub(crate) struct FlyOrder {
     pub plan: MissionPlan,
     pub preference: f32,
     pub switches: Vec<Switch>,
     pub model: Option<PathBuf>,
+    pub board: Option<BoardOrder>,
+    pub mission_out: Option<PathBuf>,
     pub json: bool,
     pub out: PathBuf,
+}
+
+/// Where the board is plugged in.
+#[derive(Debug)]
+pub(crate) struct BoardOrder {
+    pub autopilot: Endpoint,
+    pub radio: Option<Endpoint>,
 }
 
 /// The simulation in real time. With the pilot on board there is no companion port and no radio port.
 #[derive(Debug)]
 pub(crate) struct ServeOrder {
     pub plan: MissionPlan,
+    /// `None`: the pilot is in this process.
     pub companion: Option<Endpoint>,
     pub radio: Option<Endpoint>,
     pub ground: Endpoint,
     pub speed: f32,
-    pub onboard: bool,
     pub auto_takeoff: bool,
     pub mission_out: Option<PathBuf>,
     pub until_landed: bool,
@@ -142,6 +164,10 @@ pub(crate) struct ServeOrder {
 /// The demonstration: data first, then home by the cheapest way.
 const DEMONSTRATION: [&str; 7] =
     ["gleaner-sitl", "fly", "--preference", "0.9", "--switch", "150:0.1", "--seed=1"];
+
+/// A mission of six minutes then takes one and a half, and between two positions the aircraft moves no further than
+/// the referee allows for.
+const BOARD_HASTE: f32 = 4.0;
 
 impl Arguments {
     /// Reads the command line of this process.
@@ -188,11 +214,14 @@ impl FlyArguments {
     fn order(self) -> FlyOrder {
         let mut switches = self.switch;
         switches.sort_by_key(|switch| switch.after);
+        let haste = if self.board.is_some() { self.haste.unwrap_or(BOARD_HASTE) } else { 1.0 };
         FlyOrder {
-            plan: self.mission.plan(),
+            plan: MissionPlan { haste, ..self.mission.plan() },
             preference: self.preference,
             switches,
             model: self.mission.model,
+            board: self.board.map(|autopilot| BoardOrder { autopilot, radio: self.radio }),
+            mission_out: self.mission_out,
             json: self.json,
             out: self.out,
         }
@@ -202,13 +231,14 @@ impl FlyArguments {
 impl ServeArguments {
     fn order(self) -> ServeOrder {
         let outside = !self.onboard;
+        // With the pilot in this process both live by the same clock, however fast it goes.
+        let haste = if outside { self.speed.max(1.0) } else { 1.0 };
         ServeOrder {
-            plan: self.mission.plan(),
+            plan: MissionPlan { haste, ..self.mission.plan() },
             companion: outside.then_some(self.companion),
             radio: outside.then_some(self.radio),
             ground: self.gcs,
             speed: self.speed,
-            onboard: self.onboard,
             auto_takeoff: self.auto_takeoff,
             mission_out: self.mission_out,
             until_landed: self.until_landed,
@@ -243,6 +273,11 @@ fn units(text: &str) -> Result<f32, String> {
 fn speed(text: &str) -> Result<f32, String> {
     let number = text.parse::<f32>().ok().filter(|factor| (0.1..=50.0).contains(factor));
     number.ok_or_else(|| "a speed is a factor from 0.1 to 50".into())
+}
+
+fn haste(text: &str) -> Result<f32, String> {
+    let number = text.parse::<f32>().ok().filter(|factor| (1.0..=10.0).contains(factor));
+    number.ok_or_else(|| "a haste is a factor from 1 to 10".into())
 }
 
 fn switch(text: &str) -> Result<Switch, String> {
@@ -288,6 +323,8 @@ mod tests {
             ["--scenario", "rx"],
             ["--devices", "0"],
             ["--battery", "inf"],
+            ["--radio", "tcpin:127.0.0.1:0"],
+            ["--haste", "4"],
         ] {
             let words = ["gleaner-sitl", "fly"].iter().chain(&wrong);
             assert!(Arguments::try_parse_from(words).is_err(), "{wrong:?}");

@@ -2,6 +2,7 @@
 
 mod arguments;
 mod fly;
+mod introduction;
 mod model;
 mod results;
 mod serve;
@@ -47,6 +48,12 @@ pub enum ProgramError {
     /// Nobody reads what we print.
     #[error("cannot print: {0}: give it a standard output")]
     Stdout(io::Error),
+    /// The operating system does not wait for a connection.
+    #[error("cannot wait for a connection: {0}: free some memory, or file descriptors")]
+    Wait(io::Error),
+    /// No board came.
+    #[error("no board has connected for {0} s: start it, or correct --board")]
+    NobodyConnects(u64),
     /// A result cannot be written.
     #[error("cannot write {path}: {source}: choose another folder with --out")]
     Write {

@@ -1,6 +1,7 @@
 //! Finding and loading the model.
 
 use super::ProgramError;
+use super::results::Brain;
 use gleaner_policy::onnx::TractPolicy;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -27,8 +28,8 @@ fn shipped() -> PathBuf {
 }
 
 /// How a model is called in summaries: its name, its version and the beginning of its hash.
-pub(super) fn name(policy: &TractPolicy) -> String {
+pub(super) fn brain(policy: &TractPolicy) -> Brain {
     let info = policy.info();
     let hash: String = info.sha256.chars().take(12).collect();
-    format!("{} {} ({hash})", info.card.name, info.card.version)
+    Brain { model: format!("{} {} ({hash})", info.card.name, info.card.version), engine: "tract" }
 }

@@ -8,8 +8,21 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// The engine that the model runs in here.
-const ENGINE: &str = "tract";
+/// What decides in a flight, as far as it is known here.
+#[derive(Clone, Debug)]
+pub(super) struct Brain {
+    /// The model's name, version and hash, or whose it is.
+    pub model: String,
+    /// What the model runs in.
+    pub engine: &'static str,
+}
+
+impl Brain {
+    /// A pilot that is not in this process and brings its own.
+    pub fn of(whom: &'static str) -> Brain {
+        Brain { model: format!("of the {whom}"), engine: whom }
+    }
+}
 
 /// What `--json` prints: these keys and no others.
 #[derive(Serialize)]
@@ -34,7 +47,7 @@ pub(super) fn write_files(
     folder: &Path,
     simulation: &Simulation,
     figures: &Figures,
-    model: &str,
+    brain: &Brain,
 ) -> Result<PathBuf, ProgramError> {
     let fail = |path: &Path| {
         let path = path.to_owned();
@@ -53,13 +66,13 @@ pub(super) fn write_files(
     let journal = simulation.journal();
     write("flight.tlog", &|out| journal.write_tlog(out))?;
     write("decisions.jsonl", &|out| journal.write_decisions(out))?;
-    let picture = picture::trajectory(simulation, figures, model);
+    let picture = picture::trajectory(simulation, figures, &brain.model);
     let path = write("trajectory.svg", &|out| out.write_all(picture.as_bytes()))?;
     Ok(path.canonicalize().unwrap_or(path))
 }
 
 /// One JSON object.
-pub(super) fn json(figures: &Figures, model: &str, wall_s: f64) -> String {
+pub(super) fn json(figures: &Figures, brain: &Brain, wall_s: f64) -> String {
     let report = Report {
         scenario: figures.scenario.name(),
         seed: figures.seed,
@@ -71,8 +84,8 @@ pub(super) fn json(figures: &Figures, model: &str, wall_s: f64) -> String {
         landed: figures.landed,
         violations: figures.violations.len(),
         switches: figures.switches,
-        model,
-        engine: ENGINE,
+        model: &brain.model,
+        engine: brain.engine,
         wall_s,
     };
     // Serialising cannot fail: every key is a string.
@@ -83,7 +96,7 @@ pub(super) fn json(figures: &Figures, model: &str, wall_s: f64) -> String {
 pub(super) fn summary(
     simulation: &Simulation,
     figures: &Figures,
-    model: &str,
+    brain: &Brain,
 ) -> Vec<(&'static str, String)> {
     let scenario = figures.scenario.name().to_uppercase();
     let (seed, devices, preference) = (figures.seed, figures.devices, figures.preference);
@@ -92,7 +105,7 @@ pub(super) fn summary(
         simulation.journal().slots().first().map_or(0.0, |slot| (simulation.now() - slot.at).as_secs_f32());
     vec![
         ("mission", format!("{scenario}, seed {seed}, {devices} devices, w_data {preference}")),
-        ("policy", format!("{model}, engine {ENGINE}")),
+        ("policy", format!("{}, engine {}", brain.model, brain.engine)),
         ("collected", format!("{:.1} % of the data", 100.0 * figures.collected)),
         ("energy", format!("{} of {budget} battery units", figures.energy.0)),
         ("decisions", format!("{} in {flight_s:.0} s of flight", figures.decisions)),

@@ -1,0 +1,316 @@
+//! From the ONNX file to the blob of the native engine.
+
+use super::pb::tensor_proto::DataType;
+use super::pb::{GraphProto, TensorProto};
+use super::{ModelError, ModelInfo, unseal};
+use crate::native::{
+    AlignedBytes, FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, HEAD_WIDTH, Header, LAYERS, LOGIT_PANELS, Model,
+    NativePolicy, PANEL, SOURCE_BYTES, WIDTH, WeightFormat, Workspace, crc32,
+};
+use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
+use crate::{Golden, K_MAX, LOCAL_MAP_CELLS, Policy, SelfTestError, self_test};
+use gleaner_units::{Action, ActionMask};
+
+/// Why a model cannot be converted.
+#[derive(Debug, thiserror::Error)]
+pub enum ConvertError {
+    /// The model is unfit to fly in any engine.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A weight is missing or has another shape: the native engine computes one network only.
+    #[error(
+        "the model has no weight `{name}` of {rows} x {columns} numbers: the native engine runs only what \
+         `gleaner-train export` writes; use the engine tract"
+    )]
+    Weight {
+        /// Its name in the graph.
+        name: String,
+        /// Outputs.
+        rows: usize,
+        /// Inputs; 1 for a bias.
+        columns: usize,
+    },
+    /// The blob has no room for such a long text.
+    #[error("the {what} `{text}` is longer than {room} bytes: export the model under a shorter one")]
+    TooLong {
+        /// Name or version.
+        what: &'static str,
+        /// The text.
+        text: String,
+        /// Bytes that there are.
+        room: usize,
+    },
+    /// The shortened weights choose another action.
+    #[error("with these weights golden pair {pair} gets another action: convert with --weights i16 or f32")]
+    Disagrees {
+        /// Index of the golden pair.
+        pair: usize,
+    },
+    /// The graph has other operations than the native engine computes.
+    #[error("the graph has {found} operations `{operator}` instead of {expected}: use the engine tract")]
+    Graph {
+        /// Which.
+        operator: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many the network has.
+        expected: usize,
+    },
+}
+
+/// The blob for [`Model::read`], after the native engine reproduced the golden pairs with it; the same bytes each
+/// time.
+///
+/// With 8 or 16 bits the golden pairs of the blob hold the answers of these weights: they prove on board that
+/// nothing has changed since the conversion, and the conversion sees to it that they choose the same actions.
+///
+/// # Errors
+/// [`ConvertError`].
+pub fn convert(onnx: &[u8], format: WeightFormat) -> Result<Vec<u8>, ConvertError> {
+    let (model, info, mut goldens) = unseal(onnx)?;
+    let graph = model.graph.unwrap_or_default();
+    check_operators(&graph)?;
+    let mut network = Writer { graph: &graph, format, bytes: Vec::new() };
+    network.network()?;
+    if format != WeightFormat::F32 {
+        let trained = blob(&info, &goldens, format, &network.bytes)?;
+        answer(&trained, &mut goldens)?;
+    }
+    let bytes = blob(&info, &goldens, format, &network.bytes)?;
+    prove(&bytes)?;
+    Ok(bytes)
+}
+
+fn prove(bytes: &[u8]) -> Result<(), ModelError> {
+    let aligned = AlignedBytes::new(bytes);
+    let model = Model::read(aligned.as_slice())?;
+    Ok(self_test(&mut NativePolicy::new(model, &mut Workspace::new()), model.goldens())?)
+}
+
+/// Puts the answers of the blob's own weights into the golden pairs.
+fn answer(bytes: &[u8], goldens: &mut [Golden]) -> Result<(), ConvertError> {
+    let aligned = AlignedBytes::new(bytes);
+    let mut workspace = Workspace::new();
+    let mut policy =
+        NativePolicy::new(Model::read(aligned.as_slice()).map_err(ModelError::Blob)?, &mut workspace);
+    for (pair, golden) in goldens.iter_mut().enumerate() {
+        let answer = policy.infer(&golden.tokens);
+        let logits = answer.map_err(|_| ModelError::SelfTest(SelfTestError::NoAnswer { pair }))?.logits;
+        if ActionMask::FULL.argmax(&logits) != ActionMask::FULL.argmax(&golden.logits) {
+            return Err(ConvertError::Disagrees { pair });
+        }
+        golden.logits = logits;
+    }
+    Ok(())
+}
+
+fn blob(
+    info: &ModelInfo,
+    goldens: &[Golden],
+    format: WeightFormat,
+    network: &[u8],
+) -> Result<Vec<u8>, ConvertError> {
+    let mut source = [0; SOURCE_BYTES];
+    for (byte, digits) in source.iter_mut().zip(info.sha256.as_bytes().as_chunks::<2>().0) {
+        // A digest that `unseal` made is hexadecimal.
+        *byte =
+            digits.iter().fold(0, |byte, &digit| byte << 4 | (digit as char).to_digit(16).unwrap_or(0) as u8);
+    }
+    let header = Header {
+        weights: format,
+        goldens: goldens.len() as u32,
+        source,
+        name: padded("name", &info.card.name)?,
+        version: padded("version", &info.card.version)?,
+    };
+    let pairs: Vec<u8> = goldens.iter().flat_map(golden_bytes).collect();
+    let length = header.to_bytes(0).len() + pairs.len() + network.len() + size_of::<u32>();
+    let mut bytes = [&header.to_bytes(length as u32), &pairs, network].concat();
+    bytes.extend(crc32(&bytes).to_le_bytes());
+    Ok(bytes)
+}
+
+fn golden_bytes(golden: &Golden) -> Vec<u8> {
+    let tokens = &golden.tokens;
+    let before = tokens.uav.iter().chain(&tokens.preference).chain(&tokens.local_map);
+    let devices = tokens.devices.iter().chain(std::iter::repeat(&[0.0; DEVICE_FEATURES])).take(K_MAX);
+    let mut bytes = le_bytes(before);
+    bytes.extend((tokens.devices.len() as u32).to_le_bytes());
+    bytes.extend(le_bytes(devices.flatten().chain(&golden.logits)));
+    bytes
+}
+
+fn le_bytes<'n>(numbers: impl IntoIterator<Item = &'n f32>) -> Vec<u8> {
+    numbers.into_iter().flat_map(|number| number.to_le_bytes()).collect()
+}
+
+/// A graph with other activations would carry the same weights. This finds an honest change of the exporter
+/// early; the golden pairs find the rest.
+fn check_operators(graph: &GraphProto) -> Result<(), ConvertError> {
+    let linear = 4 + 4 * LAYERS + 2;
+    let counted =
+        [("Gemm", linear), ("Softmax", LAYERS), ("LayerNormalization", 2 * LAYERS), ("Relu", LAYERS + 1)];
+    for (operator, expected) in counted {
+        let found = graph.node.iter().filter(|node| node.op_type == operator).count();
+        if found != expected {
+            return Err(ConvertError::Graph { operator, found, expected });
+        }
+    }
+    Ok(())
+}
+
+fn padded<const N: usize>(what: &'static str, text: &str) -> Result<[u8; N], ConvertError> {
+    let mut bytes = [0; N];
+    match bytes.get_mut(..text.len()) {
+        Some(place) => place.copy_from_slice(text.as_bytes()),
+        None => return Err(ConvertError::TooLong { what, text: text.into(), room: N }),
+    }
+    Ok(bytes)
+}
+
+struct Writer<'g> {
+    graph: &'g GraphProto,
+    format: WeightFormat,
+    bytes: Vec<u8>,
+}
+
+impl Writer<'_> {
+    fn numbers<'n>(&mut self, numbers: impl IntoIterator<Item = &'n f32>) {
+        self.bytes.append(&mut le_bytes(numbers));
+    }
+
+    /// In the order of `Network`.
+    fn network(&mut self) -> Result<(), ConvertError> {
+        let projectors = [
+            ("project_uav", UAV_FEATURES),
+            ("project_preference", 2),
+            ("project_map", LOCAL_MAP_CELLS),
+            ("project_device", DEVICE_FEATURES),
+        ];
+        for (name, inputs) in projectors {
+            let layer = self.layer(name, WIDTH, inputs)?;
+            self.linear(&layer);
+        }
+        for encoder in 0..LAYERS {
+            self.encoder(&format!("encoder.{encoder}"))?;
+        }
+        let head = self.layer("head.0", HEAD_HIDDEN, HEAD_INPUTS)?;
+        self.linear(&head);
+        let mut logits = self.layer("head.1", Action::COUNT, HEAD_HIDDEN)?;
+        logits.pad(LOGIT_PANELS * PANEL);
+        self.linear(&logits);
+        Ok(())
+    }
+
+    fn encoder(&mut self, encoder: &str) -> Result<(), ConvertError> {
+        let name = |part: &str| format!("{encoder}.{part}");
+        let mut query = self.layer(&name("qkv"), 3 * WIDTH, WIDTH)?;
+        let key_value = query.split_off(WIDTH);
+        // A power of two: no bit is lost.
+        query.multiply(1.0 / (HEAD_WIDTH as f32).sqrt());
+        self.linear(&query);
+        self.linear(&key_value);
+        let out = self.layer(&name("out"), WIDTH, WIDTH)?;
+        self.linear(&out);
+        self.norm(&name("norm1"))?;
+        let ff1 = self.layer(&name("ff1"), FEED_FORWARD, WIDTH)?;
+        self.linear(&ff1);
+        let ff2 = self.layer(&name("ff2"), WIDTH, FEED_FORWARD)?;
+        self.linear(&ff2);
+        self.norm(&name("norm2"))
+    }
+
+    fn norm(&mut self, name: &str) -> Result<(), ConvertError> {
+        let gain = self.tensor(&format!("{name}.weight"), WIDTH, 1)?;
+        let bias = self.tensor(&format!("{name}.bias"), WIDTH, 1)?;
+        self.numbers(gain.iter().chain(&bias));
+        Ok(())
+    }
+
+    fn layer(&self, name: &str, outputs: usize, inputs: usize) -> Result<Layer, ConvertError> {
+        Ok(Layer {
+            inputs,
+            weight: self.tensor(&format!("{name}.weight"), outputs, inputs)?,
+            bias: self.tensor(&format!("{name}.bias"), outputs, 1)?,
+        })
+    }
+
+    fn tensor(&self, name: &str, rows: usize, columns: usize) -> Result<Vec<f32>, ConvertError> {
+        let missing = || ConvertError::Weight { name: name.into(), rows, columns };
+        let is_it = |tensor: &&TensorProto| {
+            let length: i64 = tensor.dims.iter().product();
+            tensor.name == name
+                && tensor.data_type == DataType::Float as i32
+                && tensor.dims.first() == Some(&(rows as i64))
+                && length == (rows * columns) as i64
+        };
+        let tensor = self.graph.initializer.iter().find(is_it).ok_or_else(missing)?;
+        let (numbers, rest) = tensor.raw_data.as_chunks::<4>();
+        if numbers.len() != rows * columns || !rest.is_empty() {
+            return Err(missing());
+        }
+        Ok(numbers.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
+    }
+
+    /// Scales, biases, weights in panels.
+    fn linear(&mut self, layer: &Layer) {
+        let largest_code = match self.format {
+            WeightFormat::F32 => None,
+            WeightFormat::I8 => Some(f32::from(i8::MAX)),
+            WeightFormat::I16 => Some(f32::from(i16::MAX)),
+        };
+        let scales: Vec<f32> = layer
+            .weight
+            .chunks_exact(layer.inputs)
+            .map(|row| {
+                let largest = row.iter().fold(0.0, |largest, weight| f32::max(largest, weight.abs()));
+                largest_code.filter(|_| largest > 0.0).map_or(1.0, |code| largest / code)
+            })
+            .collect();
+        if largest_code.is_some() {
+            self.numbers(&scales);
+        }
+        self.numbers(&layer.bias);
+        for (panel, scales) in layer.weight.chunks_exact(PANEL * layer.inputs).zip(scales.chunks_exact(PANEL))
+        {
+            for input in 0..layer.inputs {
+                for (weight, scale) in panel.iter().skip(input).step_by(layer.inputs).zip(scales) {
+                    self.weight(weight / scale);
+                }
+            }
+        }
+    }
+
+    fn weight(&mut self, number: f32) {
+        match self.format {
+            WeightFormat::F32 => self.bytes.extend(number.to_le_bytes()),
+            WeightFormat::I8 => self.bytes.extend((number.round() as i8).to_le_bytes()),
+            WeightFormat::I16 => self.bytes.extend((number.round() as i16).to_le_bytes()),
+        }
+    }
+}
+
+/// `y = x W^T + b`, the weight row by row.
+struct Layer {
+    inputs: usize,
+    weight: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl Layer {
+    /// Cuts off the outputs from `outputs` on.
+    fn split_off(&mut self, outputs: usize) -> Layer {
+        let (weight, bias) = (self.weight.split_off(outputs * self.inputs), self.bias.split_off(outputs));
+        Layer { inputs: self.inputs, weight, bias }
+    }
+
+    fn multiply(&mut self, factor: f32) {
+        self.weight.iter_mut().chain(&mut self.bias).for_each(|number| *number *= factor);
+    }
+
+    /// Adds outputs that are zero.
+    fn pad(&mut self, outputs: usize) {
+        self.weight.resize(outputs * self.inputs, 0.0);
+        self.bias.resize(outputs, 0.0);
+    }
+}

@@ -1,0 +1,166 @@
+//! A pilot behind byte streams: a board, an emulator or a companion computer.
+//!
+//! Such a pilot keeps its own clock, which nobody can hurry or stop, so the world keeps pace with the wall. The
+//! aircraft alone may live faster ([`crate::MissionPlan::haste`]): it flies from rest to rest, so between two decisions
+//! the pilot loses nothing by an aircraft that arrives sooner, and a mission of six minutes takes one and a half.
+
+use crate::aboard::Aboard;
+use crate::flight::{Ending, Flight, Flown};
+use crate::pace::Pace;
+use crate::simulation::Simulation;
+use crate::wire::Speaker;
+use gleaner_link::{Address, TUNNEL_RADIO_REPORT};
+use gleaner_ports::{Port, RECEIVE_BYTES, State, wait};
+use gleaner_radio::{Report, encode, encode_body};
+use gleaner_units::Instant;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
+use std::io;
+use std::time::{self, Duration};
+
+/// How long the pilot's port may be closed in flight: a cable that is plugged in again.
+const GONE_LIMIT: Duration = Duration::from_secs(5);
+/// Reads per port and exchange: a flood on one port must not stop the world.
+const READS_AT_ONCE: usize = 64;
+
+/// Somewhere else and on its own clock: a board, an emulator or a companion computer behind one port for the
+/// autopilot's link and one for the radio's reports. Without the second, the reports come by `TUNNEL` on the first.
+pub struct Wired {
+    autopilot: Port,
+    radio: Option<Port>,
+    /// The radio as a component of the vehicle.
+    modem: Speaker,
+}
+
+impl Wired {
+    /// `MAV_COMP_ID_TELEMETRY_RADIO`.
+    const MODEM: Address = Address::new(1, 68);
+
+    /// A pilot behind these ports.
+    #[must_use]
+    pub const fn new(autopilot: Port, radio: Option<Port>) -> Wired {
+        Wired { autopilot, radio, modem: Speaker::new(Wired::MODEM) }
+    }
+
+    /// The port of the autopilot's link.
+    #[must_use]
+    pub const fn autopilot(&self) -> &Port {
+        &self.autopilot
+    }
+
+    /// The port of the radio's reports.
+    #[must_use]
+    pub const fn radio(&self) -> Option<&Port> {
+        self.radio.as_ref()
+    }
+
+    /// Whether bytes can travel to and from the pilot.
+    #[must_use]
+    pub fn is_up(&self) -> bool {
+        self.autopilot.state() == State::Up
+    }
+
+    /// Mends ports that went down; call it some times a second.
+    pub fn maintain(&mut self, now: time::Instant) {
+        // Peers come and go; what matters of it is in `is_up`.
+        for port in [Some(&mut self.autopilot), self.radio.as_mut()].into_iter().flatten() {
+            let _ = port.maintain(now);
+        }
+    }
+
+    /// Waits for a pilot that connects; whether one has. What it says first is kept.
+    ///
+    /// # Errors
+    /// The operating system cannot wait.
+    pub fn await_peer(&mut self, at_most: Duration) -> io::Result<bool> {
+        if !self.is_up() {
+            wait(&[&self.autopilot], at_most)?;
+            // An empty buffer takes nothing but the connection.
+            self.autopilot.receive(&mut []);
+        }
+        Ok(self.is_up())
+    }
+
+    /// Noise on the lines to the pilot: bytes that neither autopilot nor radio has sent.
+    pub fn disturb(&mut self, autopilot: &[u8], radio: &[u8]) {
+        self.autopilot.send(autopilot);
+        if let Some(port) = self.radio.as_mut() {
+            port.send(radio);
+        }
+    }
+
+    /// Sleeps until a port has something to say or the time is over.
+    pub fn rest(&self, at_most: Duration) {
+        let ports: Vec<&Port> = [Some(&self.autopilot), self.radio()].into_iter().flatten().collect();
+        if wait(&ports, at_most).is_err() {
+            // Without the system's help.
+            std::thread::sleep(at_most);
+        }
+    }
+
+    fn send_report(&mut self, report: &Report) {
+        match &mut self.radio {
+            Some(radio) => radio.send(&encode(report)),
+            None => {
+                // By hand: the definitions do not list types for local use.
+                let body = encode_body(report);
+                let [low, high] = TUNNEL_RADIO_REPORT.to_le_bytes();
+                let mut payload = vec![low, high, 0, 0, body.len() as u8];
+                payload.extend_from_slice(&body);
+                self.autopilot.send(&self.modem.raw_frame(TUNNEL_DATA::ID, &payload));
+            }
+        }
+    }
+}
+
+impl Aboard for Wired {
+    fn exchange(&mut self, simulation: &mut Simulation, _: Instant) {
+        receive(&mut self.autopilot, |bytes| simulation.hear_companion(bytes));
+        if let Some(radio) = &mut self.radio {
+            // A radio hears nothing, but a listening port must look for its peer.
+            receive(radio, |_| {});
+        }
+        for frame in simulation.to_companion() {
+            self.autopilot.send(&frame);
+        }
+        for report in simulation.radio() {
+            self.send_report(&report);
+        }
+    }
+}
+
+/// Reads what is there.
+pub(crate) fn receive(port: &mut Port, mut take: impl FnMut(&[u8])) {
+    let mut buffer = [0; RECEIVE_BYTES];
+    for _ in 0..READS_AT_ONCE {
+        match port.receive(&mut buffer) {
+            0 => break,
+            count => take(&buffer[..count]),
+        }
+    }
+}
+
+/// Flies a mission in the wall's time, from boot to landing. `watch` is asked before each step; what it gives ends the
+/// flight.
+pub fn fly_wired(
+    mut flight: Flight,
+    wired: &mut Wired,
+    mut watch: impl FnMut(&Flight, &mut Wired) -> Option<Ending>,
+) -> Flown {
+    let mut pace = Pace::new(flight.simulation().staged().plan.haste);
+    let mut up_at = time::Instant::now();
+    loop {
+        for _ in 0..pace.due() {
+            if let Some(ending) = watch(&flight, wired).or_else(|| flight.step(wired)) {
+                return flight.end(ending, None);
+            }
+        }
+        wired.maintain(time::Instant::now());
+        if wired.is_up() {
+            up_at = time::Instant::now();
+        } else if up_at.elapsed() > GONE_LIMIT {
+            return flight.end(Ending::PilotGone, None);
+        }
+        wired.rest(pace.rest());
+    }
+}

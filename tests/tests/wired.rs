@@ -1,0 +1,77 @@
+//! `gleaner-sitl fly --board`: the whole mission with a pilot that is not in the harness's process.
+//!
+//! The pilot is the Linux program `gleaner` on two sockets. A board behind an emulator stands in the same place, see
+//! `board.rs`; what fails here is not the board's fault.
+
+use gleaner_tests::programs::{Running, repository};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// A mission of RB for energy alone is two decisions; ten times as fast it takes a quarter of a minute.
+const QUICK: [&str; 8] = ["--scenario", "rb", "--seed", "5", "--preference", "0", "--haste", "8"];
+
+struct Flight {
+    report: Value,
+    /// What the harness and the pilot say of each decision.
+    decisions: [Vec<Value>; 2],
+}
+
+/// Flies with `gleaner` on a line for the autopilot and, if it has one, on a line for the radio.
+fn fly(arguments: &[&str], has_radio: bool) -> Flight {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (mission, out, log) = (at("mission.toml"), at("out"), at("log"));
+    let any = "tcpin:127.0.0.1:0";
+    let mut words = vec!["fly", "--json", "--board", any, "--mission-out", &mission, "--out", &out];
+    words.extend(has_radio.then_some(["--radio", any]).into_iter().flatten());
+    words.extend_from_slice(arguments);
+    let mut city = Running::start("gleaner-sitl", &words);
+    let connect = |endpoint: String| endpoint.replace("tcpin:", "tcpout:");
+    let autopilot = connect(city.line("autopilot"));
+    let radio = has_radio.then(|| connect(city.line("radio")));
+    // The mission is named last: its file is there.
+    city.line("mission");
+    let model = repository().join("models/gleaner.onnx");
+    let mut words = vec!["run", "--autopilot", &autopilot, "--mission", &mission, "--log", &log];
+    words.extend_from_slice(&["--model", model.to_str().unwrap()]);
+    words.extend(radio.iter().flat_map(|radio| ["--radio", radio]));
+    let _pilot = Running::start("gleaner", &words);
+    let report = city.line("{");
+    let decisions = [&out, &log].map(|folder| lines(&Path::new(folder).join("decisions.jsonl")));
+    Flight { report: serde_json::from_str(&format!("{{{report}")).unwrap(), decisions }
+}
+
+fn lines(path: &Path) -> Vec<Value> {
+    let text = fs::read_to_string(path).unwrap();
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+}
+
+fn check(flight: &Flight, decisions: usize, devices: usize) {
+    let Flight { report, decisions: [harness, pilot] } = flight;
+    let verdict = (&report["landed"], &report["violations"], &report["engine"]);
+    assert_eq!(verdict, (&true.into(), &0.into(), &"board".into()), "{report}");
+    assert_eq!((harness.len(), report["decisions"].as_u64().unwrap() as usize), (decisions, decisions));
+    assert_eq!(pilot.len(), decisions);
+    for (told, made) in harness.iter().zip(pilot) {
+        for key in ["sequence", "cell", "action", "mask", "battery", "w_data", "logits", "attended"] {
+            assert_eq!(told[key], made[key], "{key} of {told} and {made}");
+        }
+        let heard = made["tokens"]["devices"].as_array().unwrap();
+        assert_eq!(heard.len(), devices);
+        // The radio was heard: these are no SNRs of silence.
+        assert!(heard.iter().all(|device| device[3].as_f64().unwrap() > -30.0), "{made}");
+    }
+}
+
+#[test]
+fn a_pilot_on_two_lines_flies_the_mission_to_the_terminal() {
+    let flight = fly(&QUICK, true);
+    check(&flight, 2, 6);
+    assert_eq!(flight.report["energy"], 2.0);
+}
+
+#[test]
+fn without_a_line_of_its_own_the_radio_reports_by_tunnel() {
+    check(&fly(&QUICK, false), 2, 6);
+}
