@@ -1,5 +1,5 @@
 //! Learns, evaluates and exports policies: multi-objective soft actor-critic with the attention network
-//! (MOSAC-ATT, `paper`, section IV).
+//! (MOSAC-ATT, `paper`, section IV), and the systems that the paper compares it with.
 //!
 //! # Glossary
 //! - **flight**: an episode of the world with the guard on, under one preference.
@@ -7,12 +7,14 @@
 //! - **update**: one gradient step of all networks on one batch; **step**: one slot of one flight.
 //! - **temperature**: two of them, as in the paper: nu weighs the entropy in the objectives, tau heats the softmax
 //!   that explores.
+//! - **system**: a learning algorithm with an **encoding**, which is how it sees a state and what it remembers of it.
 //! - **realization**: devices drawn for a scenario; evaluation realizations are never trained on.
 //!
 //! # How it hangs together
-//! `train` reads top to bottom; what it calls lives beside it: [`flight`] and [`observation`] make samples,
-//! [`replay`] keeps them, [`mosac`] and [`ddqn`] learn from them, [`evaluation`] judges, [`checkpoint`] survives a kill,
-//! [`export`] writes the model. The networks are [`net`], and [`system`] names which system learns with which.
+//! `train` reads top to bottom; what it calls lives beside it: [`flight`] and [`encoding`] make samples,
+//! [`replay`] keeps them, [`mosac`] or [`ddqn`] learns from them (what the loop asks of either is [`learner`]),
+//! [`validation`] and [`evaluation`] judge, [`checkpoint`] survives a kill, [`learned`] is what is left, [`export`]
+//! writes the model. The networks themselves are [`net`]; [`system`] lists what can be trained.
 //!
 //! The policies that fly come another way: [`distil`] copies the [`teacher`], who knows what the aircraft cannot see,
 //! and [`refine`] lets the pupil learn from its own flights. What they are measured against is the [`oracle`]: the

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 
 const WIDTH: f64 = 440.0;
 const HEIGHT: f64 = 310.0;
-const LEFT: f64 = 58.0;
+const LEFT: f64 = 70.0;
 const RIGHT: f64 = 12.0;
 const TOP: f64 = 12.0;
 const BOTTOM: f64 = 46.0;
@@ -285,10 +285,10 @@ pub(super) fn legend(entries: &[(String, Look)]) -> Markup {
 /// what is absent.
 pub(super) fn heat_map(words: &str, names: &[String], matrix: &[Vec<f32>], strongest: f32) -> Markup {
     let cell = 19.0;
-    let (left, top) = (66.0, 62.0);
+    let (left, top) = (80.0, 78.0);
     let side = cell * names.len() as f64;
     html! {
-        svg viewBox=(format!("0 0 {} {}", left + side + 8.0, top + side + 22.0)) role="img" aria-label=(words) {
+        svg viewBox=(format!("0 0 {} {}", left + side + 14.0, top + side + 24.0)) role="img" aria-label=(words) {
             rect.absent x=(px(left)) y=(px(top)) width=(px(side)) height=(px(side)) {}
             @for (index, name) in names.iter().enumerate() {
                 @let middle = cell * (index as f64 + 0.5);
@@ -307,7 +307,7 @@ pub(super) fn heat_map(words: &str, names: &[String], matrix: &[Vec<f32>], stron
                     }
                 }
             }
-            text.label x=(px(left + side / 2.0)) y=(px(top + side + 16.0)) text-anchor="middle" { "rows: who looks (query); columns: at whom (key)" }
+            text.label x=(px(left + side)) y=(px(top + side + 17.0)) text-anchor="end" { "rows: who looks (query); columns: at whom (key)" }
         }
     }
 }

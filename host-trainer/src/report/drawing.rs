@@ -27,7 +27,7 @@ pub(super) fn city(heights: &HeightMap) -> Markup {
     html! {
         svg.hidden width="0" height="0" aria-hidden="true" {
             symbol #city viewBox=(view(heights)) {
-                rect.ground width="100%" height="100%" {}
+                rect.ground x="-6" y="-6" width="100%" height="100%" {}
                 @for (index, class) in ROOFS.into_iter().enumerate() {
                     path class=(format!("roof{index}")) d=(roofs(class)) {}
                 }
@@ -48,7 +48,7 @@ pub(super) fn mission(words: &str, heights: &HeightMap, track: &Track) -> Markup
     let ends = [track.cells.first(), track.cells.last()].map(|cell| cell.map(at).unwrap_or_default());
     html! {
         svg viewBox=(view(heights)) role="img" aria-label=(words) {
-            use href="#city" {}
+            use href="#city" x="-6" y="-6" width="100%" height="100%" {}
             polyline.halo points=(way) {}
             polyline.way points=(way) {}
             @for (cell, slots) in &hovers {
@@ -90,7 +90,8 @@ fn slice(x: f64, y: f64, r: f64, share: f64) -> String {
 
 fn view(heights: &HeightMap) -> String {
     let grid = heights.grid();
-    format!("0 0 {} {}", f64::from(grid.width()) * CELL, f64::from(grid.height()) * CELL)
+    // A margin for the signs of devices at the edge.
+    format!("-6 -6 {} {}", f64::from(grid.width()) * CELL + 12.0, f64::from(grid.height()) * CELL + 12.0)
 }
 
 /// North is up.

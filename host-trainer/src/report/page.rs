@@ -88,8 +88,8 @@ fn tiles(report: &Report) -> Markup {
                 (tile(format!("{rd:.2} / {rb:.2}"), "battery units, RD / RB, w = (0, 1)", "32 / 2"))
             }
             @if let Some((_, regular, faded)) = fading {
-                @let loss = regular.mean_and_std().0 - faded.mean_and_std().0;
-                (tile(points(loss), "data lost to Rayleigh fading, RD", "0.26 points"))
+                @let change = faded.mean_and_std().0 - regular.mean_and_std().0;
+                (tile(points(change), "data under Rayleigh fading, RD", "\u{2212}0.26 points"))
             }
             @if let Some(parameters) = system.parameters {
                 (tile(super::chart::grouped(&parameters.to_string()), "parameters", "91\u{2009}781"))
@@ -102,9 +102,9 @@ fn tiles(report: &Report) -> Markup {
     }
 }
 
-fn points(loss: f32) -> String {
-    // A minus sign here would read as a gain that is a loss.
-    if loss < 0.0 { format!("{:.2} points gained", -loss) } else { format!("{loss:.2} points") }
+fn points(change: f32) -> String {
+    let sign = if change < 0.0 { "" } else { "+" };
+    format!("{sign}{} points", super::chart::grouped(&format!("{change:.2}")))
 }
 
 fn section(id: &str, title: &str, body: Markup) -> Markup {
@@ -120,10 +120,11 @@ fn main_section(report: &Report) -> Markup {
             p {
                 "RD reaches a destination 32 cells away, RB returns to its base. Data is in percent of what all devices "
                 "hold, energy in battery units; a preference w = (data, energy) weighs the two. "
-                "Hypervolume is the area above (-1, -200) that the eleven preferences dominate: of the front of their "
-                "means, and as the mean over single realizations. The oracle knows map, channel and devices; it is a "
-                "strong search, not a proof. No system can pass the upper bound: it is proven for data and energy, and "
-                "the bounds of utility and hypervolume follow from those two, loosely."
+                "Hypervolume is the area above (\u{2212}1, \u{2212}200) that the eleven preferences dominate: of the front of "
+                "their means, and as the mean over single realizations. The oracle knows map, channel and devices; its "
+                "numbers are what the best tour that it found brings in the mean of the channel. It is a strong search, "
+                "not a proof. No system can pass the proven bound: it is computed for the data, it is the shortest "
+                "mission for the energy, and the bounds of utility and hypervolume follow from those two, loosely."
             }
         },
     )
@@ -226,14 +227,8 @@ fn fading_section(detail: &Detail) -> Markup {
         "fading",
         "Robustness to fading (table I)",
         html! {
-            div.scroll { table {
-                caption {
-                    b { "Table I. " } "Data at w = (1, 0), K = 6, B = 80, percent: the mean over the realizations, flown "
-                    (repeats) " times with other draws of the channel; mean and standard deviation of the "
-                    (repeats) " means. With fading, every link gains 20 log10 |h| dB, |h| Rayleigh-distributed with scale "
-                    "1. Policies are trained without. The paper does not say which scenario its table is of; its level is "
-                    "RD's. Oracle and upper bound were not computed under fading. From " code { "fading.csv" } "."
-                }
+            figure {
+                div.scroll { table {
                 thead { tr {
                     th scope="col" { "system" } th scope="col" { "regular" span.unit { "%" } }
                     th scope="col" { "with fading" span.unit { "%" } } th scope="col" { "loss" span.unit { "points" } }
@@ -251,7 +246,15 @@ fn fading_section(detail: &Detail) -> Markup {
                         }
                     }
                 }
-            } }
+                } }
+                figcaption {
+                    b { "Table I. " } "Data at w = (1, 0), K = 6, B = 80, percent: the mean over the realizations, flown "
+                    (repeats) " times with other draws of the channel; mean and standard deviation of the "
+                    (repeats) " means. With fading, every link gains 20 log10 |h| dB, |h| Rayleigh-distributed with scale "
+                    "1. Policies are trained without. The paper does not say which scenario its table is of; its level is "
+                    "RD's. Oracle and proven bound were not computed under fading. From " code { "fading.csv" } "."
+                }
+            }
         },
     )
 }
@@ -261,16 +264,12 @@ fn engines_section(report: &Report) -> Markup {
         "engines",
         "Size and inference time (section V-C)",
         html! {
-            div.scroll { table {
-                caption {
-                    "Parameters of the policy that decides, and the time of one decision with one observation at a time: "
-                    "median and 99th percentile, measured on " (report.machine) ". The time includes building the tokens. "
-                    "The paper measured on an Intel Xeon Gold 6278C with 4 cores. From " code { "engines.csv" } "."
-                }
+            figure {
+                div.scroll { table {
                 thead { tr {
                     th scope="col" { "system" } th scope="col" { "parameters" }
                     th scope="col" { "median" span.unit { "ms" } } th scope="col" { "99 %" span.unit { "ms" } }
-                    th scope="col" { "read from, flown by" }
+                    th.text scope="col" { "read from, flown by" }
                 } }
                 tbody {
                     tr.reference { th scope="row" { "paper, MOSAC-ATT" } td { "91\u{2009}781" } td { "2.0 (mean)" } td.missing { "not printed" } td.text { "" } }
@@ -293,7 +292,13 @@ fn engines_section(report: &Report) -> Markup {
                         }
                     }
                 }
-            } }
+                } }
+                figcaption {
+                    "Parameters of the policy that decides, and the time of one decision with one observation at a time: "
+                    "median and 99th percentile, measured on " (report.machine) ". The time includes building the tokens. "
+                    "The paper measured on an Intel Xeon Gold 6278C with 4 cores. From " code { "engines.csv" } "."
+                }
+            }
         },
     )
 }
@@ -318,7 +323,7 @@ fn generalization_section(report: &Report) -> Markup {
                 }
                 figcaption {
                     b { "Figure 6. " } "By number of devices K; B = 80, and B = 100 for K = 10. The trained setting is set "
-                    "off. Stars: numbers that the paper prints for MOSAC-ATT. Bars at the battery: standard deviation. From "
+                    "off. Stars: numbers that the paper prints for MOSAC-ATT. Bars at the battery: standard deviation among realizations. From "
                     code { "metrics.csv" } "."
                 }
             }
@@ -366,8 +371,7 @@ fn attention_section(detail: &Detail) -> Markup {
 
 fn shares_table(detail: &Detail) -> Markup {
     html! {
-        div.scroll { table {
-            caption { "Share of all attention that each kind of token receives, percent. From " code { "attention.csv" } "." }
+        figure { div.scroll { table {
             thead { tr { th scope="col" { "preference" } @for kind in KINDS { th scope="col" { (kind) span.unit { "%" } } } } }
             tbody {
                 @for gaze in &detail.gazes {
@@ -378,6 +382,8 @@ fn shares_table(detail: &Detail) -> Markup {
                 }
             }
         } }
+            figcaption { "Share of all attention that each kind of token receives. From " code { "attention.csv" } "." }
+        }
     }
 }
 
@@ -390,7 +396,7 @@ fn published_section() -> Markup {
                 "All numbers of its results that the paper prints in text or table. Where this page says \"not printed\", "
                 "the paper has a figure only, and nothing was read off a picture. From " code { "published.csv" } "."
             }
-            div.scroll { table {
+            div.scroll { table.words {
                 thead { tr { th scope="col" { "what" } th scope="col" { "value" } th scope="col" { "place" } } }
                 tbody {
                     @for cited in &CITATIONS {

@@ -9,7 +9,7 @@ use gleaner_world::ScenarioKind;
 use maud::{Markup, html};
 
 /// What the bound is called in tables and legends.
-pub(super) const BOUND: &str = "upper bound";
+pub(super) const BOUND: &str = "proven bound";
 /// What the paper's numbers are called.
 pub(super) const PAPER: &str = "paper";
 const NOT_COMPUTED: &str = "not computed";
@@ -43,12 +43,23 @@ impl Metric {
         }
     }
 
+    /// As a heading.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Metric::Coverage => "Data at w = (1, 0)",
+            Metric::LeastEnergy => "Battery at w = (0, 1)",
+            Metric::Utility => "Average utility",
+            Metric::Hypervolume => "Hypervolume of the mean front",
+            Metric::MeanHypervolume => "Mean hypervolume",
+        }
+    }
+
     pub const fn unit(self) -> &'static str {
         match self {
             Metric::Coverage => "% of the data",
             Metric::LeastEnergy => "battery units",
-            Metric::Utility => "w . (%, -units)",
-            Metric::Hypervolume | Metric::MeanHypervolume => "% x units",
+            Metric::Utility => "w \u{b7} (%, \u{2212}units)",
+            Metric::Hypervolume | Metric::MeanHypervolume => "% \u{d7} units",
         }
     }
 
@@ -134,12 +145,9 @@ pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
     let limits = report.limits(setting);
     let best = |metric: Metric| best_of(metric, tables.iter().flatten());
     html! {
-        div.scroll { table {
-            caption {
-                b { (setting.scenario_name()) ", K = " (setting.devices) ", B = " (setting.battery) ". " }
-                "Mean over " (report.realizations) " realizations; ± is the standard deviation among them. Bold: the best "
-                "of the systems. From " code { "metrics.csv" } ". " (bounded(report, setting))
-            }
+        figure {
+            h3 { (setting.scenario_name()) ", K = " (setting.devices) ", B = " (setting.battery) }
+            div.scroll { table {
             thead { tr {
                 th scope="col" { "system" }
                 @for metric in Metric::ALL { th scope="col" { (metric.name()) span.unit { (metric.unit()) } } }
@@ -173,19 +181,21 @@ pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
                     @for metric in Metric::ALL { (limit_cell(metric, setting, limits)) }
                 }
             }
-        } }
+            } }
+            figcaption {
+                "Mean over " (report.realizations) " realizations; ± is the standard deviation among them. Bold: the best "
+                "of the systems. From " code { "metrics.csv" } ". " (bounded(report, setting))
+            }
+        }
     }
 }
 
 /// Settings in rows, systems in columns: one metric.
 pub(super) fn metric_table(report: &Report, metric: Metric) -> Markup {
     html! {
-        div.scroll { table {
-            caption {
-                b { (metric.name()) ", " (metric.unit()) ". " }
-                "Mean over " (report.realizations) " realizations a row; the trained setting is set off. From "
-                code { "metrics.csv" } "."
-            }
+        figure {
+            h3 { (metric.title()) ", " (metric.unit()) }
+            div.scroll { table {
             thead { tr {
                 th scope="col" { "setting" }
                 th scope="col" { (PAPER) span.unit { "MOSAC-ATT" } }
@@ -194,7 +204,12 @@ pub(super) fn metric_table(report: &Report, metric: Metric) -> Markup {
                 th scope="col" { (BOUND) }
             } }
             tbody { @for setting in Setting::ALL { (metric_row(report, metric, setting)) } }
-        } }
+            } }
+            figcaption {
+                "Mean over " (report.realizations) " realizations a row; the trained setting is set off. From "
+                code { "metrics.csv" } "."
+            }
+        }
     }
 }
 
