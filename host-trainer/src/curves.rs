@@ -61,27 +61,30 @@ impl Point {
         Value::Object(object).to_string()
     }
 
-    /// Numbers anywhere in the line count, under the names of the way to them: runs of older versions nest theirs.
     fn parse(line: &str) -> Option<Point> {
-        let Value::Object(object) = serde_json::from_str(line).ok()? else { return None };
-        let update = object.get("update")?.as_u64()?;
-        let unix_s = object.get("unix_s").and_then(Value::as_f64).unwrap_or(0.0);
-        let mut scalars = BTreeMap::new();
-        for (name, value) in &object {
-            match (name.as_str(), value) {
-                ("update" | "unix_s", _) => {}
-                ("tables", tables) => {
-                    let tables: Tables = serde_json::from_value(tables.clone()).ok()?;
-                    scalars.extend(scalars_of(&tables));
-                }
-                (_, Value::Object(parts)) => {
-                    scalars.extend(parts.iter().filter_map(|(name, v)| Some((name.clone(), v.as_f64()?))));
-                }
-                _ => scalars.extend(value.as_f64().map(|value| (name.clone(), value))),
-            }
-        }
-        Some(Point { update, unix_s, scalars })
+        let value: Value = serde_json::from_str(line).ok()?;
+        let update = value.get("update")?.as_u64()?;
+        let unix_s = value.get("unix_s").and_then(Value::as_f64).unwrap_or(0.0);
+        Some(Point { update, unix_s, scalars: scalars_in(&value)?.into_iter().collect() })
     }
+}
+
+/// The numbers in an object by their names: its own, those of the objects in it such as the losses, and the metrics of
+/// its validation `tables`. `None` if it is no object or its tables are none.
+#[must_use]
+pub fn scalars_in(value: &Value) -> Option<Vec<(String, f64)>> {
+    let mut scalars = Vec::new();
+    for (name, value) in value.as_object()? {
+        match (name.as_str(), value) {
+            ("update" | "unix_s", _) => {}
+            ("tables", tables) => scalars.extend(scalars_of(&serde_json::from_value(tables.clone()).ok()?)),
+            (_, Value::Object(parts)) => {
+                scalars.extend(parts.iter().filter_map(|(name, part)| Some((name.clone(), part.as_f64()?))));
+            }
+            _ => scalars.extend(value.as_f64().map(|number| (name.clone(), number))),
+        }
+    }
+    Some(scalars)
 }
 
 /// The numbers of a validation, by scenario.
@@ -113,14 +116,14 @@ impl Curves {
     /// # Errors
     /// See [`CurvesError`]; the old curve is then still there.
     pub fn open(folder: &Path, update: u64) -> Result<Curves, CurvesError> {
-        let mut points = read(folder)?;
-        points.retain(|point| point.update <= update);
+        let mut told = told(folder)?;
+        told.retain(|(_, point)| point.update <= update);
         let lines = folder.join(CURVE);
-        let text: String = points.iter().map(|point| point.line() + "\n").collect();
+        let text: String = told.iter().map(|(line, _)| format!("{line}\n")).collect();
         replace(&lines, text.as_bytes())?;
         let events = folder.join(EVENTS);
         let mut bytes = Vec::new();
-        for event in [Event::first()].into_iter().chain(points.iter().map(Event::of)) {
+        for event in [Event::first()].into_iter().chain(told.iter().map(|(_, point)| Event::of(point))) {
             record(&event, &mut bytes).expect("writing to memory cannot fail");
         }
         replace(&events, &bytes)?;
@@ -155,6 +158,11 @@ impl Curves {
 /// # Errors
 /// See [`CurvesError`].
 pub fn read(folder: &Path) -> Result<Vec<Point>, CurvesError> {
+    Ok(told(folder)?.into_iter().map(|(_, point)| point).collect())
+}
+
+/// The lines as they stand, and what they say.
+fn told(folder: &Path) -> Result<Vec<(String, Point)>, CurvesError> {
     let path = folder.join(CURVE);
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
@@ -162,8 +170,9 @@ pub fn read(folder: &Path) -> Result<Vec<Point>, CurvesError> {
         Err(error) => return Err(io_error(&path, error)),
     };
     let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let parse = |(index, line)| {
-        Point::parse(line).ok_or_else(|| CurvesError::Damaged { path: path.clone(), line: index + 1 })
+    let parse = |(index, line): (usize, &str)| match Point::parse(line) {
+        Some(point) => Ok((line.to_owned(), point)),
+        None => Err(CurvesError::Damaged { path: path.clone(), line: index + 1 }),
     };
     whole.lines().enumerate().map(parse).collect()
 }
@@ -293,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_older_versions_are_read_and_damage_is_named() {
+    fn nested_lines_are_read_and_damage_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let row = r#"{"w_data":1.0,"data_percent":47.5,"energy":80.0,"energy_std":0.0}"#;
         let line = format!(

@@ -2,16 +2,21 @@
 
 use super::learned_of;
 use anyhow::{Context, Result, bail};
+use gleaner_host_trainer::curves::{Curves, scalars_in};
 use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::refine::Refinement;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::train::{CURVE, Learned, Run, Tables};
+use gleaner_host_trainer::train::{Learned, Run, Tables};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::fs::{self, File, OpenOptions};
-use std::io::{IsTerminal, Write};
+use serde::Serialize;
+use std::fs;
+use std::io::IsTerminal;
 use std::path::PathBuf;
+
+/// Updates between two points of the losses in the learning curve.
+const LOSSES_EVERY: u64 = 250;
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -77,10 +82,11 @@ pub fn run(arguments: &TrainArguments) -> Result<()> {
 fn by_trial<L: Learner>(arguments: &Arguments) -> Result<()> {
     let mut desk = Desk::open(L::SYSTEM, arguments)?;
     let mut run = Run::<L>::open(arguments.settings.clone(), &arguments.out)?;
-    desk.begin(run.update());
+    desk.begin(run.update())?;
     while !run.is_done() {
         let losses = run.advance()?;
         desk.bar.set_position(run.update());
+        desk.note(run.update(), &losses)?;
         if desk.validation_is_due(run.update()) {
             let told = losses.to_string();
             let progress = run.validate(losses, &mut desk.best)?;
@@ -100,10 +106,11 @@ pub fn distil(arguments: &DistilArguments) -> Result<()> {
     let arguments = &arguments.usual;
     let mut desk = Desk::open(System::MosacAtt, arguments)?;
     let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref())?;
-    desk.begin(run.update());
+    desk.begin(run.update())?;
     while !run.is_done() {
         let cross_entropy = run.advance()?;
         desk.bar.set_position(run.update());
+        desk.note(run.update(), &serde_json::json!({ "cross_entropy": cross_entropy }))?;
         if desk.validation_is_due(run.update()) {
             let tables = run.validate(&mut desk.best)?;
             let line = serde_json::json!({
@@ -152,7 +159,7 @@ struct Desk<'a> {
     system: System,
     arguments: &'a Arguments,
     bar: ProgressBar,
-    curve: File,
+    curves: Option<Curves>,
     best: Option<Learned>,
 }
 
@@ -164,16 +171,29 @@ impl<'a> Desk<'a> {
         }
         let out = &arguments.out;
         fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
-        let path = out.join(CURVE);
-        let curve = OpenOptions::new().create(true).append(true).open(&path);
-        let curve = curve.with_context(|| path.display().to_string())?;
         let best = Learned::load_of(system, out)?;
-        Ok(Desk { system, arguments, bar: bar(arguments.settings.updates), curve, best })
+        Ok(Desk { system, arguments, bar: bar(arguments.settings.updates), curves: None, best })
     }
 
-    fn begin(&self, update: u64) {
+    /// The learning curve goes on from where the run goes on.
+    fn begin(&mut self, update: u64) -> Result<()> {
+        self.curves = Some(Curves::open(&self.arguments.out, update)?);
         self.bar.set_position(update);
         self.bar.reset_eta();
+        Ok(())
+    }
+
+    /// The losses, often enough to watch them fall.
+    fn note(&mut self, update: u64, losses: &impl Serialize) -> Result<()> {
+        if update.is_multiple_of(LOSSES_EVERY) {
+            self.log(update, &serde_json::to_value(losses)?)?;
+        }
+        Ok(())
+    }
+
+    fn log(&mut self, update: u64, told: &serde_json::Value) -> Result<()> {
+        let scalars = scalars_in(told).unwrap_or_default();
+        self.curves.as_mut().map_or(Ok(()), |curves| Ok(curves.log(update, &scalars)?))
     }
 
     fn validation_is_due(&self, update: u64) -> bool {
@@ -184,7 +204,7 @@ impl<'a> Desk<'a> {
         update.is_multiple_of(self.arguments.checkpoint_every) || update == self.arguments.settings.updates
     }
 
-    /// One line of the curve and one for people, whether or not anyone watches the bar; keeps the best.
+    /// One point of the curve and one line for people, whether or not anyone watches the bar; keeps the best.
     fn report(
         &mut self,
         curve: &serde_json::Value,
@@ -192,7 +212,7 @@ impl<'a> Desk<'a> {
         losses: &str,
         tables: &Tables,
     ) -> Result<()> {
-        writeln!(self.curve, "{curve}").context("the learning curve cannot be written")?;
+        self.log(update, curve)?;
         if let Some(best) = self.best.as_ref().filter(|best| best.update == update) {
             best.save(&self.arguments.out)?;
         }

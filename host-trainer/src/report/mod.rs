@@ -122,9 +122,17 @@ impl Report {
         self.oracle.iter().rev().find(|oracle| oracle.is_of(setting))
     }
 
-    /// The proven limits in one setting.
+    /// Whether the oracle flew the same realizations as the systems: means over others do not compare.
+    #[must_use]
+    pub fn compares(&self, setting: Setting) -> bool {
+        self.oracle(setting).is_some_and(|oracle| oracle.missions.realizations() as u64 == self.realizations)
+    }
+
+    /// The proven limits in one setting; `None` unless exactly the realizations of the systems were bounded.
     #[must_use]
     pub fn limits(&self, setting: Setting) -> Option<Limits> {
-        self.oracle(setting)?.limits(setting)
+        let oracle = self.oracle(setting)?;
+        let is_whole = oracle.upper_bound_percent.len() as u64 == self.realizations;
+        is_whole.then(|| oracle.limits(setting)).flatten()
     }
 }

@@ -142,6 +142,7 @@ pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
     let setting = Setting::trained(kind);
     let tables: Vec<Option<Table>> = report.systems.iter().map(|system| system.table(setting)).collect();
     let oracle = report.oracle(setting).map(|oracle| oracle.missions.table());
+    let compared = oracle.as_ref().filter(|_| report.compares(setting));
     let limits = report.limits(setting);
     let best = |metric: Metric| best_of(metric, tables.iter().flatten());
     html! {
@@ -163,7 +164,7 @@ pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
                         @for metric in Metric::ALL {
                             @match table {
                                 Some(table) => {
-                                    (cell(metric, table, oracle.as_ref(), best(metric) == Some(metric.of(table))))
+                                    (cell(metric, table, compared, best(metric) == Some(metric.of(table))))
                                 }
                                 None => (missing())
                             }
@@ -216,6 +217,7 @@ pub(super) fn metric_table(report: &Report, metric: Metric) -> Markup {
 fn metric_row(report: &Report, metric: Metric, setting: Setting) -> Markup {
     let tables: Vec<Option<Table>> = report.systems.iter().map(|system| system.table(setting)).collect();
     let oracle = report.oracle(setting).map(|oracle| oracle.missions.table());
+    let compared = oracle.as_ref().filter(|_| report.compares(setting));
     let best = best_of(metric, tables.iter().flatten());
     html! {
         tr.trained[setting == Setting::trained(setting.kind)] {
@@ -223,7 +225,7 @@ fn metric_row(report: &Report, metric: Metric, setting: Setting) -> Markup {
             (published_cell(metric, setting))
             @for table in &tables {
                 @match table {
-                    Some(table) => (cell(metric, table, oracle.as_ref(), best == Some(metric.of(table)))),
+                    Some(table) => (cell(metric, table, compared, best == Some(metric.of(table)))),
                     None => (missing()),
                 }
             }
