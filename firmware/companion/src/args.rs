@@ -2,6 +2,7 @@
 
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
+use gleaner_policy::EngineKind;
 use gleaner_policy::native::WeightFormat;
 use gleaner_ports::Endpoint;
 use std::path::PathBuf;
@@ -28,8 +29,21 @@ pub enum Command {
         #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=3600))]
         wait_s: u64,
     },
+    /// Time one inference in each engine, side by side.
+    Bench(Bench),
     /// Convert a model for the native engine, and let it prove itself there.
     Convert(Conversion),
+}
+
+/// A model to time.
+#[derive(Args)]
+pub struct Bench {
+    /// The trained policy (.onnx).
+    #[arg(long, value_name = "FILE")]
+    pub model: PathBuf,
+    /// How many inferences of each kind.
+    #[arg(long, value_name = "NUMBER", default_value_t = 501, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub inferences: u32,
 }
 
 /// A model to convert.
@@ -40,7 +54,7 @@ pub struct Conversion {
     /// The file to write (.gln).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// How weights are stored: f32, i8 or i16.
+    /// How weights are stored: f32 or i16.
     #[arg(long, value_name = "FORMAT", default_value = "f32", value_parser = weights)]
     pub weights: WeightFormat,
 }
@@ -61,6 +75,9 @@ pub struct Setup {
     /// The trained policy.
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
+    /// What runs it: tract or native.
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Option<EngineKind>,
     /// The mission.
     #[arg(long, value_name = "FILE")]
     pub mission: Option<PathBuf>,
@@ -70,7 +87,7 @@ pub struct Setup {
 }
 
 fn weights(name: &str) -> Result<WeightFormat, String> {
-    WeightFormat::from_name(name).ok_or_else(|| "it must be f32, i8 or i16".into())
+    WeightFormat::from_name(name).ok_or_else(|| "it must be f32 or i16".into())
 }
 
 /// Reads the command line of this process.

@@ -8,8 +8,7 @@ use crate::log::DecisionLog;
 use crate::run::open;
 use gleaner_link::{Firmware, FrameDecoder, Message};
 use gleaner_pilot::Mission;
-use gleaner_policy::Policy;
-use gleaner_policy::onnx::TractPolicy;
+use gleaner_policy::{Engine, Policy};
 use gleaner_ports::{Port, RECEIVE_BYTES, wait};
 use gleaner_units::BatteryUnits;
 use std::process::ExitCode;
@@ -30,13 +29,12 @@ pub fn check(setup: &Setup, wait_s: u64) -> Result<ExitCode, StartError> {
     if let Some(mission) = findings.of("mission", load::mission(&config.mission), describe) {
         check_mission(&mut findings, &mission, &config);
     }
-    let model = findings.of("model", load::model(&config.model), |model| {
-        let info = model.info();
-        let identity: String = info.sha256.chars().take(12).collect();
-        format!(
-            "{} {}, {} steps in {}, sha256 {identity}",
-            info.card.name, info.card.version, info.card.steps, info.card.scenario
-        )
+    let model = findings.of("model", load::model(&config.model, config.engine), |model| {
+        let trained = model
+            .card()
+            .map_or_else(String::new, |card| format!(", {} steps in {}", card.steps, card.scenario));
+        let identity: String = model.sha256().chars().take(12).collect();
+        format!("{} {}{trained}, sha256 {identity}", model.name(), model.version())
     });
     if let Some(model) = model {
         check_engine(&mut findings, model);
@@ -154,7 +152,8 @@ fn percent(part: BatteryUnits, whole: BatteryUnits) -> f32 {
 }
 
 /// The model has proved itself when it was loaded; here its speed is measured.
-fn check_engine(findings: &mut Findings, mut model: TractPolicy) {
+fn check_engine(findings: &mut Findings, mut model: Engine) {
+    findings.good("engine", model.to_string());
     let goldens = model.goldens().to_vec();
     findings.good("self-test", format!("{} golden pairs reproduced", goldens.len()));
     let mut took = Vec::with_capacity(TIMED_INFERENCES);

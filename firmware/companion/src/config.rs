@@ -2,6 +2,7 @@
 //!
 //! ```toml
 //! model = "policy.onnx"                       # paths are relative to this file
+//! engine = "tract"                            # optional: tract or native
 //! mission = "mission.toml"
 //! autopilot = "serial:/dev/ttyAMA0:921600"
 //! radio = "serial:/dev/ttyUSB0:115200"        # optional: reports may also come by TUNNEL
@@ -16,6 +17,7 @@
 use crate::args::Setup;
 use gleaner_link::Parameters;
 use gleaner_pilot::Settings;
+use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -27,6 +29,8 @@ use toml::Spanned;
 pub struct Config {
     /// The model file.
     pub model: PathBuf,
+    /// What runs the model.
+    pub engine: EngineKind,
     /// The mission file.
     pub mission: PathBuf,
     /// Port to the autopilot.
@@ -78,6 +82,7 @@ pub enum ConfigError {
 #[serde(deny_unknown_fields)]
 struct File {
     model: Option<PathBuf>,
+    engine: Option<Spanned<String>>,
     mission: Option<PathBuf>,
     autopilot: Option<Spanned<String>>,
     radio: Option<Spanned<String>>,
@@ -121,11 +126,13 @@ fn merge(setup: &Setup, source: &Source<'_>) -> Result<Config, ConfigError> {
     let missing = |key, example| ConfigError::Missing { key, example };
     // All of the file is checked, also what a flag overrides: a fault must not wait for another day.
     let autopilot = file.autopilot.as_ref().map(|text| source.endpoint("autopilot", text)).transpose()?;
+    let engine = file.engine.as_ref().map(|name| source.engine(name)).transpose()?;
     let radio = file.radio.as_ref().map(|text| source.endpoint("radio", text)).transpose()?;
     Ok(Config {
         settings: source.settings(&file)?,
         parameters: source.parameters(&file.parameters)?,
         model: path(&setup.model, &file.model).ok_or(missing("model", "policy.onnx"))?,
+        engine: setup.engine.or(engine).unwrap_or_default(),
         mission: path(&setup.mission, &file.mission).ok_or(missing("mission", "mission.toml"))?,
         autopilot: setup
             .autopilot
@@ -145,6 +152,12 @@ impl Source<'_> {
 
     fn endpoint(&self, key: &str, text: &Spanned<String>) -> Result<Endpoint, ConfigError> {
         text.get_ref().parse().map_err(|error| self.fault(text.span().start, format!("{key}: {error}")))
+    }
+
+    fn engine(&self, name: &Spanned<String>) -> Result<EngineKind, ConfigError> {
+        name.get_ref()
+            .parse()
+            .map_err(|error| self.fault(name.span().start, format!("engine = {:?}: {error}", name.get_ref())))
     }
 
     /// MAVLink guide, "Routing": 0 means everybody; 255 is what ground stations call themselves, and component 1
@@ -223,17 +236,20 @@ GLN_ALT = 75.5
     fn paths_are_relative_to_the_file_and_flags_go_first() {
         let config = merged(&Setup::default(), TEXT).unwrap();
         assert_eq!(config.model, Path::new("/etc/gleaner/policy.onnx"));
+        assert_eq!(config.engine, EngineKind::Tract);
         assert_eq!(config.mission, Path::new("/etc/gleaner/missions/city.toml"));
         assert_eq!(config.log_dir.as_deref(), Some(Path::new("/var/log/gleaner")));
         assert_eq!(config.settings, Settings { system_id: Some(7), component_id: 192 });
         assert_eq!(config.parameters.altitude().0, 75.5);
         let setup = Setup {
             model: Some("other.onnx".into()),
+            engine: Some(EngineKind::Native),
             autopilot: Some("tcpout:127.0.0.1:5760".parse().unwrap()),
             ..Setup::default()
         };
         let config = merged(&setup, TEXT).unwrap();
         assert_eq!(config.model, Path::new("other.onnx"));
+        assert_eq!(config.engine, EngineKind::Native);
         assert_eq!(config.autopilot.to_string(), "tcpout:127.0.0.1:5760");
         assert_eq!(config.radio.unwrap().to_string(), "serial:/dev/ttyUSB0:115200");
     }
@@ -267,8 +283,17 @@ GLN_ALT = 75.5
             assert_eq!(fault(&TEXT.replace(from, to)), format!("{file}{expected}"));
         }
         for (from, to, start) in [
-            ("model =", "modle =", "line 1: unknown field `modle`, expected one of `model`, `mission`"),
+            (
+                "model =",
+                "modle =",
+                "line 1: unknown field `modle`, expected one of `model`, `engine`, `mission`",
+            ),
             ("udpin:127.0.0.1:14540", "udpin:14540", "line 3: autopilot: 'udpin:14540' is not an endpoint: "),
+            (
+                "component_id",
+                "engine = \"onnx\"\ncomponent_id",
+                "line 6: engine = \"onnx\": an engine is tract or native",
+            ),
             ("GLN_W_DATA = 1", "GLN_W_DATA = nan", "line 10: GLN_W_DATA = NaN: "),
             ("GLN_W_DATA = 1", "GLN_W_DATA = -1", "line 10: GLN_W_DATA = -1: "),
             ("GLN_ALT = 75.5", "GLN_ALT = 1e300", "line 11: GLN_ALT = 1"),

@@ -2,15 +2,15 @@
 
 use crate::error::StartError;
 use gleaner_pilot::{Mission, mission_file};
-use gleaner_policy::onnx::TractPolicy;
+use gleaner_policy::{Engine, EngineKind};
 use std::fs;
 use std::path::Path;
 
 /// The model, after it proved itself on its golden pairs.
-pub fn model(path: &Path) -> Result<TractPolicy, StartError> {
+pub fn model(path: &Path, engine: EngineKind) -> Result<Engine, StartError> {
     let bytes =
         fs::read(path).map_err(|source| StartError::Read { what: "model", path: path.to_owned(), source })?;
-    TractPolicy::load_checked(&bytes).map_err(|source| StartError::Model { path: path.to_owned(), source })
+    Engine::load_checked(&bytes, engine).map_err(|source| StartError::Model { path: path.to_owned(), source })
 }
 
 /// The mission with its city, whose path is relative to the mission file.

@@ -7,6 +7,7 @@
 //! stderr: what, where, what to do.
 
 mod args;
+mod bench;
 mod check;
 mod clock;
 mod config;
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
     let outcome = match args::parse() {
         Ok(args::Command::Run(setup)) => run::run(&setup),
         Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
+        Ok(args::Command::Bench(order)) => bench::bench(&order),
         Ok(args::Command::Convert(conversion)) => convert::convert(&conversion),
         Err(answered) => return answered,
     };

@@ -12,7 +12,7 @@ use crate::log::DecisionLog;
 use crate::timed::Timed;
 use gleaner_link::Severity;
 use gleaner_pilot::{Onboard, State};
-use gleaner_policy::onnx::TractPolicy;
+use gleaner_policy::Engine;
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use gleaner_units::Duration as PilotDuration;
 use std::io::IsTerminal;
@@ -37,8 +37,8 @@ const FRAME_BYTES: usize = 280;
 pub fn run(setup: &Setup) -> Result<ExitCode, StartError> {
     let config = config::resolve(setup)?;
     let mission = load::mission(&config.mission)?;
-    let engine = load::model(&config.model)?;
-    let model = engine.info().card.name.clone();
+    let engine = load::model(&config.model, config.engine)?;
+    let model = format!("{}, engine {engine}", engine.name());
     // The engine reproduced its golden pairs, or it would not have been loaded.
     let onboard =
         Onboard::new(mission, config.parameters.clone(), config.settings, Timed::new(engine), Ok(()))
@@ -91,7 +91,7 @@ fn introduce(config: &Config, model: &str, link: &Port, radio: Option<&Port>) {
 }
 
 struct Flight {
-    onboard: Onboard<Timed<TractPolicy>>,
+    onboard: Onboard<Timed<Engine>>,
     link: Port,
     radio: Option<Port>,
     log: Option<DecisionLog>,

@@ -19,6 +19,7 @@ fn a_good_set_up_is_ready() {
         "battery",
         "altitude",
         "model",
+        "engine",
         "self-test",
         "inference",
         "autopilot",

@@ -36,8 +36,12 @@ mod situation;
 mod tokens;
 
 #[cfg(feature = "std")]
+mod engine;
+#[cfg(feature = "std")]
 pub mod onnx;
 
+#[cfg(feature = "std")]
+pub use engine::{Engine, EngineKind, EngineNameError};
 pub use golden::{GOLDEN_TOLERANCE, Golden, SelfTestError, self_test};
 pub use inference::{Attention, Inference, Policy};
 pub use situation::{DeviceState, Preference, Situation};

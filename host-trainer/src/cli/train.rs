@@ -133,9 +133,10 @@ pub fn refine(arguments: &RefineArguments) -> Result<()> {
     let arguments = &arguments.usual;
     let mut desk = Desk::open(System::MosacAtt, arguments)?;
     let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, &from, confidence)?;
-    desk.begin(run.update());
+    desk.begin(run.update())?;
     while !run.is_done() {
         let findings = run.advance()?;
+        desk.note(run.update(), &findings)?;
         desk.bar.set_position(run.update());
         if desk.validation_is_due(run.update()) {
             let tables = run.validate(&mut desk.best)?;

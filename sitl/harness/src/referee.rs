@@ -1,8 +1,9 @@
 //! The referee: watches the truth and the wire, and knows nothing of how the pilot works.
 
 use crate::autopilot::{CopterMode, Truth};
+use crate::mission::Staged;
 use gleaner_guard::Guard;
-use gleaner_pilot::{DecisionRecord, Mission, Parameters, State};
+use gleaner_pilot::{DecisionRecord, Parameters, State};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Duration, GridFrame, Instant};
 use std::fmt;
 
@@ -107,6 +108,7 @@ pub struct Referee {
     parameters: Parameters,
     /// Standard deviation of the position estimate, m.
     wander_m: f32,
+    take_over_grace: Duration,
     left: BatteryUnits,
     energy: BatteryUnits,
     decisions: u32,
@@ -136,18 +138,19 @@ impl Referee {
     const POSITION_AGE_M: f32 = 1.5;
     /// The pilot holds its altitude within centimetres; a climb to it ends within 3 m.
     const ALTITUDE_BAND_M: f32 = 5.0;
-    /// A heartbeat tells of a new mode at once, but a target may have been on the way.
-    const TAKE_OVER_GRACE: Duration = Duration::from_secs(1);
+    /// A heartbeat tells of a new mode at once, but a target may have been on the way. On the pilot's clock, s.
+    const TAKE_OVER_GRACE_S: f32 = 1.0;
 
-    /// A referee for a mission, in the estimator's frame.
+    /// A referee for a mission that was laid out, with the envelope of its reserve.
     #[must_use]
-    pub fn new(mission: &Mission, guard: Guard, frame: GridFrame, wander_m: f32) -> Referee {
+    pub fn new(staged: &Staged, guard: Guard) -> Referee {
         Referee {
             guard,
-            frame,
+            frame: staged.frame,
             parameters: Parameters::default(),
-            wander_m,
-            left: mission.budget,
+            wander_m: staged.plan.wander_m,
+            take_over_grace: Duration::from_secs_f32(Referee::TAKE_OVER_GRACE_S * staged.plan.haste),
+            left: staged.mission.budget,
             energy: BatteryUnits(0.0),
             decisions: 0,
             expected: None,
@@ -239,6 +242,7 @@ impl Referee {
 
     fn watch_mode(&mut self, now: Instant, truth: &Truth) {
         match truth.mode {
+            _ if !truth.speaks => self.other_mode_since = None,
             CopterMode::Guided => self.other_mode_since = None,
             CopterMode::Land => {}
             _ => {
@@ -251,7 +255,7 @@ impl Referee {
         }
         let ignored = truth.ignored_targets > self.ignored_targets;
         self.ignored_targets = truth.ignored_targets;
-        let taken = self.other_mode_since.is_some_and(|since| now - since > Referee::TAKE_OVER_GRACE);
+        let taken = self.other_mode_since.is_some_and(|since| now - since > self.take_over_grace);
         if ignored && taken && !self.excursions.take_over {
             self.violated(now, Breach::TargetsAfterTakeOver);
         }

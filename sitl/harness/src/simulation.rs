@@ -41,7 +41,7 @@ impl Simulation {
         let modem = Modem::new(staged.world.clone(), &staged.realization, staged.seed())?;
         let modem = modem.with_haste(staged.plan.haste);
         let guard = staged.mission.guard(staged.plan.reserve)?;
-        let referee = Referee::new(&staged.mission, guard, staged.frame, staged.plan.wander_m);
+        let referee = Referee::new(&staged, guard);
         Ok(Simulation {
             copter: Copter::new(staged.copter),
             now: Instant::ZERO,

@@ -172,6 +172,16 @@ fn a_target_beyond_the_fence_is_noticed_by_the_lack_of_progress() {
 }
 
 #[test]
+fn an_autopilot_that_reboots_in_flight_is_left_alone() {
+    let incidents = vec![Incident { after: Duration::from_secs(20), kind: IncidentKind::AutopilotReboots }];
+    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let figures = flown.figures();
+    assert_eq!(figures.violations, [], "{:?}", texts(&flown));
+    assert_eq!(flown.ending, Ending::OnTheGround);
+    assert!(!figures.landed && (8..=12).contains(&figures.decisions), "{figures:?}");
+}
+
+#[test]
 fn a_battery_failsafe_sends_it_home() {
     let incidents = vec![Incident { after: Duration::from_secs(10), kind: IncidentKind::Voltage(10.2) }];
     let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);

@@ -18,7 +18,7 @@
 //! | last | 4 | CRC-32 (ISO-HDLC) of all before |
 
 use super::network::Network;
-use super::{FEED_FORWARD, HEAD_HIDDEN, HEADS, LAYERS, WIDTH};
+use super::{FEED_FORWARD, HEAD_HIDDEN, HEADS, LAYERS, PANEL, WIDTH};
 use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
 use crate::{Golden, K_MAX, LOCAL_MAP_CELLS, Tokens, schema};
 use core::fmt;
@@ -97,22 +97,19 @@ impl AlignedBytes {
 pub enum WeightFormat {
     /// As they were learned.
     F32 = 0,
-    /// 8 bits and a scale for each output.
-    I8 = 1,
-    /// 16 bits and a scale for each output.
-    I16 = 2,
+    /// 16 bits and a scale for each output: half the flash. Shorter weights decide otherwise too often.
+    I16 = 1,
 }
 
 impl WeightFormat {
     /// All of them.
-    pub const ALL: [WeightFormat; 3] = [WeightFormat::F32, WeightFormat::I8, WeightFormat::I16];
+    pub const ALL: [WeightFormat; 2] = [WeightFormat::F32, WeightFormat::I16];
 
     /// As it is written on a command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             WeightFormat::F32 => "f32",
-            WeightFormat::I8 => "i8",
             WeightFormat::I16 => "i16",
         }
     }
@@ -140,9 +137,9 @@ pub enum BlobError {
         /// Its version of the layout.
         found: u32,
     },
-    /// It is longer or shorter than it says, or than its weights need.
+    /// It is longer or shorter than it says, or than its parts need.
     Length {
-        /// How many bytes it should have.
+        /// How many bytes it should have, at least.
         expected: usize,
         /// How many there are.
         found: usize,
@@ -217,7 +214,7 @@ pub(super) struct Reader<'m> {
 impl<'m> Reader<'m> {
     /// The next part, in place.
     pub fn take<T: FromBytes + Immutable + KnownLayout>(&mut self) -> Result<&'m T, BlobError> {
-        let (part, rest) = T::ref_from_prefix(self.rest).map_err(|_| self.length_error())?;
+        let (part, rest) = T::ref_from_prefix(self.rest).map_err(|_| self.length_error(size_of::<T>()))?;
         self.rest = rest;
         Ok(part)
     }
@@ -226,9 +223,10 @@ impl<'m> Reader<'m> {
         self.take().map(|bytes| u32::from_le_bytes(*bytes))
     }
 
-    /// The parts do not fill the file: no [`SHAPE`] and format that we know were written like this.
-    fn length_error(&self) -> BlobError {
-        BlobError::Length { expected: self.length, found: self.length.saturating_sub(self.rest.len()) }
+    /// The parts do not fill the file exactly: another `bytes` were to come.
+    fn length_error(&self, bytes: usize) -> BlobError {
+        let before = self.length.saturating_sub(self.rest.len());
+        BlobError::Length { expected: before.saturating_add(bytes), found: self.length }
     }
 }
 
@@ -274,9 +272,8 @@ pub struct Model<'m> {
 /// The network in one of the formats.
 #[derive(Clone, Copy)]
 pub(super) enum Weights<'m> {
-    F32(Network<'m, f32>),
-    I8(Network<'m, i8>),
-    I16(Network<'m, i16>),
+    F32(Network<'m, [f32; PANEL]>),
+    I16(Network<'m, [i16; PANEL]>),
 }
 
 impl<'m> Model<'m> {
@@ -308,11 +305,10 @@ impl<'m> Model<'m> {
         let goldens = take_goldens(&mut reader, goldens)?;
         let weights = match weights {
             WeightFormat::F32 => Weights::F32(Network::read(&mut reader)?),
-            WeightFormat::I8 => Weights::I8(Network::read(&mut reader)?),
             WeightFormat::I16 => Weights::I16(Network::read(&mut reader)?),
         };
         if !reader.rest.is_empty() {
-            return Err(reader.length_error());
+            return Err(reader.length_error(0));
         }
         Ok(Model { name, version, source, goldens, weights })
     }
@@ -340,7 +336,6 @@ impl<'m> Model<'m> {
     pub fn format(&self) -> WeightFormat {
         match self.weights {
             Weights::F32(_) => WeightFormat::F32,
-            Weights::I8(_) => WeightFormat::I8,
             Weights::I16(_) => WeightFormat::I16,
         }
     }
@@ -384,7 +379,8 @@ fn text(bytes: &[u8]) -> Result<&str, BlobError> {
 
 fn take_goldens<'m>(reader: &mut Reader<'m>, count: usize) -> Result<&'m [[u32; GOLDEN_WORDS]], BlobError> {
     let goldens = <[[u32; GOLDEN_WORDS]]>::ref_from_prefix_with_elems(reader.rest, count);
-    let (goldens, rest) = goldens.map_err(|_| reader.length_error())?;
+    let bytes = count.saturating_mul(size_of::<[u32; GOLDEN_WORDS]>());
+    let (goldens, rest) = goldens.map_err(|_| reader.length_error(bytes))?;
     reader.rest = rest;
     match goldens.iter().position(|words| golden(words).is_none()) {
         Some(pair) => Err(BlobError::Golden { pair }),

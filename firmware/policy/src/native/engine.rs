@@ -3,7 +3,7 @@
 use super::attention::{KeyValue, Weights as HeadWeights, add_mean, attend, blocks};
 use super::blob::{Model, Weights};
 use super::kernel::multiply;
-use super::network::{Encoder, Linear, Network, Weight};
+use super::network::{Encoder, Linear, Network, Stored};
 use super::rowwise::{add_and_norm, rectify};
 use super::{
     BLOCKS, Block, FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LANES, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS,
@@ -105,7 +105,6 @@ impl Policy for NativePolicy<'_> {
         let map = map.map_err(|_| NativeError::LocalMap { cells })?;
         let logits = match &self.model.weights {
             Weights::F32(network) => self.workspace.run(network, tokens, &map),
-            Weights::I8(network) => self.workspace.run(network, tokens, &map),
             Weights::I16(network) => self.workspace.run(network, tokens, &map),
         };
         let answer = Inference { logits, attention: self.workspace.attention.clone() };
@@ -119,7 +118,7 @@ impl Policy for NativePolicy<'_> {
 }
 
 impl Workspace {
-    fn run<W: Weight>(
+    fn run<W: Stored>(
         &mut self,
         network: &Network<'_, W>,
         tokens: &Tokens,
@@ -142,7 +141,7 @@ impl Workspace {
     }
 
     /// Normalises and projects each token into its lane.
-    fn embed<W: Weight>(&mut self, network: &Network<'_, W>, tokens: &Tokens, map: &[f32; LOCAL_MAP_CELLS]) {
+    fn embed<W: Stored>(&mut self, network: &Network<'_, W>, tokens: &Tokens, map: &[f32; LOCAL_MAP_CELLS]) {
         let mut devices = [[0.0; DEVICE_FEATURES]; FIRST_DEVICE_TOKEN]
             .into_iter()
             .chain(tokens.devices.iter().map(|device| normalise(device, &DEVICE)));
@@ -163,7 +162,7 @@ impl Workspace {
     }
 
     /// One encoder layer: `x = norm(x + attention(x))`, `x = norm(x + ff(x))`, block by block.
-    fn encode<W: Weight>(&mut self, layer: &Encoder<'_, W>, present: usize, explain: bool) {
+    fn encode<W: Stored>(&mut self, layer: &Encoder<'_, W>, present: usize, explain: bool) {
         let Workspace { tokens, key_value, query, mixed, hidden, head_weights, attention } = self;
         for (block, key_value) in tokens.iter().zip(key_value.iter_mut()).take(blocks(present)) {
             multiply(&layer.key_value, block, key_value);
@@ -238,7 +237,7 @@ fn normalise<const N: usize>(numbers: &[f32; N], table: &[Normalisation; N]) -> 
 }
 
 /// One token through its projector.
-fn project<W: Weight, const INPUTS: usize>(
+fn project<W: Stored, const INPUTS: usize>(
     layer: &Linear<'_, W, INPUTS, WIDTH_PANELS>,
     numbers: &[f32; INPUTS],
 ) -> [f32; WIDTH] {

@@ -1,7 +1,7 @@
 //! The linear layer, where nearly all the time goes.
 
 use super::PANEL;
-use super::network::{Linear, Weight};
+use super::network::{Linear, Stored};
 
 /// `y = x W^T + b` for `LANES` tokens side by side.
 ///
@@ -11,7 +11,7 @@ use super::network::{Linear, Weight};
 /// # Cost
 /// `INPUTS * 4 PANELS * LANES` multiply-adds.
 pub(super) fn multiply<
-    W: Weight,
+    W: Stored,
     const INPUTS: usize,
     const PANELS: usize,
     const OUTPUTS: usize,
@@ -27,7 +27,7 @@ pub(super) fn multiply<
     for (((panel, scale), bias), outputs) in panels.zip(outputs) {
         let mut sums = [[0.0; LANES]; PANEL];
         for (weights, x) in panel.iter().zip(x) {
-            add_product(&mut sums, weights.map(Weight::widen), x);
+            add_product(&mut sums, weights.widen(), x);
         }
         for (((output, sums), scale), bias) in outputs.iter_mut().zip(sums).zip(scale).zip(bias) {
             *output = sums.map(|sum| sum * scale + bias);

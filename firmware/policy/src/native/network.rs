@@ -6,39 +6,30 @@ use crate::LOCAL_MAP_CELLS;
 use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
-/// How one weight is stored.
-pub(super) trait Weight: Copy + FromBytes + Immutable + KnownLayout + 'static {
+/// The weights of [`PANEL`] outputs for one input, as they are stored.
+pub(super) trait Stored: Copy + FromBytes + Immutable + KnownLayout + 'static {
     /// Whether an output must be multiplied by its scale.
     const SCALED: bool;
 
-    /// The number that enters the multiplication.
-    fn widen(self) -> f32;
+    /// The numbers that enter the multiplication.
+    fn widen(self) -> [f32; PANEL];
 }
 
-impl Weight for f32 {
+impl Stored for [f32; PANEL] {
     const SCALED: bool = false;
 
     #[inline(always)]
-    fn widen(self) -> f32 {
+    fn widen(self) -> [f32; PANEL] {
         self
     }
 }
 
-impl Weight for i8 {
+impl Stored for [i16; PANEL] {
     const SCALED: bool = true;
 
     #[inline(always)]
-    fn widen(self) -> f32 {
-        f32::from(self)
-    }
-}
-
-impl Weight for i16 {
-    const SCALED: bool = true;
-
-    #[inline(always)]
-    fn widen(self) -> f32 {
-        f32::from(self)
+    fn widen(self) -> [f32; PANEL] {
+        self.map(f32::from)
     }
 }
 
@@ -47,10 +38,10 @@ impl Weight for i16 {
 pub(super) struct Linear<'m, W, const INPUTS: usize, const PANELS: usize> {
     pub scale: &'m [[f32; PANEL]; PANELS],
     pub bias: &'m [[f32; PANEL]; PANELS],
-    pub weight: &'m [[[W; PANEL]; INPUTS]; PANELS],
+    pub weight: &'m [[W; INPUTS]; PANELS],
 }
 
-impl<'m, W: Weight, const INPUTS: usize, const PANELS: usize> Linear<'m, W, INPUTS, PANELS> {
+impl<'m, W: Stored, const INPUTS: usize, const PANELS: usize> Linear<'m, W, INPUTS, PANELS> {
     fn read(reader: &mut Reader<'m>) -> Result<Self, BlobError> {
         let scale = if W::SCALED { reader.take()? } else { &[[1.0; PANEL]; PANELS] };
         Ok(Linear { scale, bias: reader.take()?, weight: reader.take()? })
@@ -83,7 +74,7 @@ pub(super) struct Encoder<'m, W> {
     pub norm2: Norm<'m>,
 }
 
-impl<'m, W: Weight> Encoder<'m, W> {
+impl<'m, W: Stored> Encoder<'m, W> {
     fn read(reader: &mut Reader<'m>) -> Result<Self, BlobError> {
         Ok(Encoder {
             query: Linear::read(reader)?,
@@ -109,7 +100,7 @@ pub(super) struct Network<'m, W> {
     pub logits: Linear<'m, W, HEAD_HIDDEN, LOGIT_PANELS>,
 }
 
-impl<'m, W: Weight> Network<'m, W> {
+impl<'m, W: Stored> Network<'m, W> {
     pub fn read(reader: &mut Reader<'m>) -> Result<Self, BlobError> {
         Ok(Network {
             project_uav: Linear::read(reader)?,

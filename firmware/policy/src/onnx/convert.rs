@@ -41,7 +41,7 @@ pub enum ConvertError {
         room: usize,
     },
     /// The shortened weights choose another action.
-    #[error("with these weights golden pair {pair} gets another action: convert with --weights i16 or f32")]
+    #[error("with these weights golden pair {pair} gets another action: convert with --weights f32")]
     Disagrees {
         /// Index of the golden pair.
         pair: usize,
@@ -61,7 +61,7 @@ pub enum ConvertError {
 /// The blob for [`Model::read`], after the native engine reproduced the golden pairs with it; the same bytes each
 /// time.
 ///
-/// With 8 or 16 bits the golden pairs of the blob hold the answers of these weights: they prove on board that
+/// With 16 bits the golden pairs of the blob hold the answers of these weights: they prove on board that
 /// nothing has changed since the conversion, and the conversion sees to it that they choose the same actions.
 ///
 /// # Errors
@@ -254,38 +254,30 @@ impl Writer<'_> {
 
     /// Scales, biases, weights in panels.
     fn linear(&mut self, layer: &Layer) {
-        let largest_code = match self.format {
-            WeightFormat::F32 => None,
-            WeightFormat::I8 => Some(f32::from(i8::MAX)),
-            WeightFormat::I16 => Some(f32::from(i16::MAX)),
+        let scales = match self.format {
+            WeightFormat::F32 => vec![1.0; layer.bias.len()],
+            WeightFormat::I16 => layer.scales(f32::from(i16::MAX)),
         };
-        let scales: Vec<f32> = layer
-            .weight
-            .chunks_exact(layer.inputs)
-            .map(|row| {
-                let largest = row.iter().fold(0.0, |largest, weight| f32::max(largest, weight.abs()));
-                largest_code.filter(|_| largest > 0.0).map_or(1.0, |code| largest / code)
-            })
-            .collect();
-        if largest_code.is_some() {
+        if self.format != WeightFormat::F32 {
             self.numbers(&scales);
         }
         self.numbers(&layer.bias);
-        for (panel, scales) in layer.weight.chunks_exact(PANEL * layer.inputs).zip(scales.chunks_exact(PANEL))
-        {
+        let (scales, _) = scales.as_chunks::<PANEL>();
+        for (panel, scales) in layer.weight.chunks_exact(PANEL * layer.inputs).zip(scales) {
             for input in 0..layer.inputs {
-                for (weight, scale) in panel.iter().skip(input).step_by(layer.inputs).zip(scales) {
-                    self.weight(weight / scale);
-                }
+                let mut column = panel.iter().skip(input).step_by(layer.inputs);
+                self.column(scales.map(|scale| column.next().map_or(0.0, |weight| weight / scale)));
             }
         }
     }
 
-    fn weight(&mut self, number: f32) {
+    /// The weights of one input in one panel, in units of their scales.
+    fn column(&mut self, weights: [f32; PANEL]) {
         match self.format {
-            WeightFormat::F32 => self.bytes.extend(number.to_le_bytes()),
-            WeightFormat::I8 => self.bytes.extend((number.round() as i8).to_le_bytes()),
-            WeightFormat::I16 => self.bytes.extend((number.round() as i16).to_le_bytes()),
+            WeightFormat::F32 => self.numbers(&weights),
+            WeightFormat::I16 => {
+                self.bytes.extend(weights.iter().flat_map(|weight| (weight.round() as i16).to_le_bytes()))
+            }
         }
     }
 }
@@ -302,6 +294,13 @@ impl Layer {
     fn split_off(&mut self, outputs: usize) -> Layer {
         let (weight, bias) = (self.weight.split_off(outputs * self.inputs), self.bias.split_off(outputs));
         Layer { inputs: self.inputs, weight, bias }
+    }
+
+    /// For each output, so that its largest weight becomes the largest code.
+    fn scales(&self, largest_code: f32) -> Vec<f32> {
+        let largest = |row: &[f32]| row.iter().fold(0.0, |largest, weight| f32::max(largest, weight.abs()));
+        let scale = |largest: f32| if largest > 0.0 { largest / largest_code } else { 1.0 };
+        self.weight.chunks_exact(self.inputs).map(|row| scale(largest(row))).collect()
     }
 
     fn multiply(&mut self, factor: f32) {

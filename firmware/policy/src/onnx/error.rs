@@ -1,5 +1,6 @@
 //! Why a model file is refused.
 
+use super::ConvertError;
 use crate::SelfTestError;
 use crate::native::BlobError;
 
@@ -70,6 +71,12 @@ pub enum ModelError {
     /// The file of the native engine is not fit for it.
     #[error("{0}")]
     Blob(#[from] BlobError),
+    /// The file of the native engine was given to another one.
+    #[error("this is the native engine's own file: choose the engine native, or give the ONNX file")]
+    NativeOnly,
+    /// The model has no form for the native engine.
+    #[error("{0}")]
+    Convert(Box<ConvertError>),
     /// The golden pairs are not reproduced.
     #[error("self-test failed: {0}: do not fly; export the model again, or report this machine")]
     SelfTest(#[from] SelfTestError),

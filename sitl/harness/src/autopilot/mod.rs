@@ -101,6 +101,8 @@ pub struct Truth {
     pub battery: BatteryUnits,
     /// Whether a target that was not a number has ended it: it is silent since.
     pub killed_by_nan: bool,
+    /// Whether it speaks: not while it boots again, and nobody can know its mode then.
+    pub speaks: bool,
     /// Position targets that were ignored: not GUIDED, not flying, or beyond the fence.
     pub ignored_targets: u32,
 }
@@ -139,6 +141,7 @@ pub struct Copter {
     /// The estimate is this far from the truth.
     wander: [f64; 3],
     rng: ChaCha8Rng,
+    speaks_from: Instant,
     next_heartbeat: Instant,
     killed_by_nan: bool,
     ignored_targets: u32,
@@ -176,6 +179,7 @@ impl Copter {
             battery: Battery::new(settings.pack),
             wander: [0.0; 3],
             rng: rand::SeedableRng::seed_from_u64(settings.seed),
+            speaks_from: Instant::ZERO,
             next_heartbeat: Instant::ZERO,
             killed_by_nan: false,
             ignored_targets: 0,
@@ -229,7 +233,8 @@ impl Copter {
         let fresh = Copter::new(self.settings);
         let before = std::mem::replace(self, fresh);
         self.booted_at = before.booted_at + (before.now - Instant::ZERO);
-        self.next_heartbeat = Instant::ZERO + BOOT_TIME;
+        self.speaks_from = Instant::ZERO + BOOT_TIME;
+        self.next_heartbeat = self.speaks_from;
         self.body = Body::at([north, east, ground]);
         self.parameters = before.parameters;
         self.battery = before.battery;
@@ -256,6 +261,7 @@ impl Copter {
             mode: self.mode,
             battery: self.battery.left(),
             killed_by_nan: self.killed_by_nan,
+            speaks: self.now >= self.speaks_from,
             ignored_targets: self.ignored_targets,
         }
     }

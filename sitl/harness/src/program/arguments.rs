@@ -3,6 +3,7 @@
 use crate::{MissionPlan, Switch};
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
+use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
 use gleaner_units::{BatteryUnits, Duration};
 use gleaner_world::ScenarioKind;
@@ -47,6 +48,9 @@ struct MissionArguments {
     /// The model [default: models/gleaner.onnx].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
+    /// What runs the model: tract or native.
+    #[arg(long, value_name = "ENGINE", default_value = "tract")]
+    engine: EngineKind,
 }
 
 #[derive(Debug, Args)]
@@ -131,6 +135,7 @@ pub(crate) struct FlyOrder {
     pub preference: f32,
     pub switches: Vec<Switch>,
     pub model: Option<PathBuf>,
+    pub engine: EngineKind,
     pub board: Option<BoardOrder>,
     pub mission_out: Option<PathBuf>,
     pub json: bool,
@@ -157,6 +162,7 @@ pub(crate) struct ServeOrder {
     pub mission_out: Option<PathBuf>,
     pub until_landed: bool,
     pub model: Option<PathBuf>,
+    pub engine: EngineKind,
     pub json: bool,
     pub out: PathBuf,
 }
@@ -220,6 +226,7 @@ impl FlyArguments {
             preference: self.preference,
             switches,
             model: self.mission.model,
+            engine: self.mission.engine,
             board: self.board.map(|autopilot| BoardOrder { autopilot, radio: self.radio }),
             mission_out: self.mission_out,
             json: self.json,
@@ -243,6 +250,7 @@ impl ServeArguments {
             mission_out: self.mission_out,
             until_landed: self.until_landed,
             model: self.mission.model,
+            engine: self.mission.engine,
             json: self.json,
             out: self.out,
         }

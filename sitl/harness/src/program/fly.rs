@@ -24,7 +24,7 @@ pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
     let wishes = Wishes { switches: order.switches.clone(), ..Wishes::plain(order.preference) };
     let (flown, brain) = match &order.board {
         None => {
-            let policy = model::load(order.model.as_deref())?;
+            let policy = model::load(order.model.as_deref(), order.engine)?;
             let brain = model::brain(&policy);
             (crate::fly(staged, wishes, policy, Ok(()))?, brain)
         }

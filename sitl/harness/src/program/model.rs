@@ -2,7 +2,7 @@
 
 use super::ProgramError;
 use super::results::Brain;
-use gleaner_policy::onnx::TractPolicy;
+use gleaner_policy::{Engine, EngineKind};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 const SHIPPED: &str = "models/gleaner.onnx";
 
 /// Loads the model and lets it prove itself.
-pub(super) fn load(path: Option<&Path>) -> Result<TractPolicy, ProgramError> {
+pub(super) fn load(path: Option<&Path>, engine: EngineKind) -> Result<Engine, ProgramError> {
     let path = path.map_or_else(shipped, Path::to_owned);
     let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
         ErrorKind::NotFound => ProgramError::ModelMissing(path.clone()),
         _ => ProgramError::ModelRead { path: path.clone(), source },
     })?;
-    TractPolicy::load_checked(&bytes).map_err(|source| ProgramError::Model { path, source })
+    Engine::load_checked(&bytes, engine).map_err(|source| ProgramError::Model { path, source })
 }
 
 /// Next to the program, else in the source tree that it was built from.
@@ -28,8 +28,7 @@ fn shipped() -> PathBuf {
 }
 
 /// How a model is called in summaries: its name, its version and the beginning of its hash.
-pub(super) fn brain(policy: &TractPolicy) -> Brain {
-    let info = policy.info();
-    let hash: String = info.sha256.chars().take(12).collect();
-    Brain { model: format!("{} {} ({hash})", info.card.name, info.card.version), engine: "tract" }
+pub(super) fn brain(policy: &Engine) -> Brain {
+    let hash: String = policy.sha256().chars().take(12).collect();
+    Brain { model: format!("{} {} ({hash})", policy.name(), policy.version()), engine: policy.kind().name() }
 }

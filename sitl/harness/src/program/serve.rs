@@ -8,7 +8,7 @@ use super::{model, results};
 use crate::wired::receive;
 use crate::{Aboard, Figures, FlightError, Operator, Orders, Pace, STEP, Simulation, Staged, Wired};
 use gleaner_pilot::{Onboard, Parameters, Settings};
-use gleaner_policy::onnx::TractPolicy;
+use gleaner_policy::Engine;
 use gleaner_ports::{Endpoint, Port, wait};
 use gleaner_units::{Duration, Instant};
 use gleaner_world::World;
@@ -37,7 +37,7 @@ pub(super) fn serve(order: &ServeOrder) -> Result<bool, ProgramError> {
 /// Who decides.
 enum Pilot {
     /// The pilot of this process, on the aircraft's clock.
-    Inside(Box<Onboard<TractPolicy>>, Brain),
+    Inside(Box<Onboard<Engine>>, Brain),
     /// Whoever connects, on the wall's.
     Outside(Wired),
 }
@@ -46,7 +46,7 @@ impl Pilot {
     fn open(order: &ServeOrder, staged: &Staged) -> Result<Pilot, ProgramError> {
         let open = |endpoint: &Endpoint| Port::open(endpoint).map_err(ProgramError::Port);
         let Some(companion) = &order.companion else {
-            let policy = model::load(order.model.as_deref())?;
+            let policy = model::load(order.model.as_deref(), order.engine)?;
             let brain = model::brain(&policy);
             let (mission, settings) = (staged.mission.clone(), Settings::default());
             let onboard = Onboard::new(mission, Parameters::default(), settings, policy, Ok(()));

@@ -1,5 +1,4 @@
 //! The three serial lines: pins, speeds, interrupts.
-
 use cortex_m::peripheral::NVIC;
 use gleaner_cortex_m::bare::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
 use gleaner_cortex_m::{LineFault, Uart};
@@ -16,7 +15,7 @@ const OVERRUN: u32 = 1 << 3;
 const RECEIVED: u32 = 1 << 5;
 const ROOM: u32 = 1 << 7;
 
-/// Gives the pins to the UARTs and starts them.
+/// Gives the pins to the UARTs, starts them.
 pub fn start(chip: &Peripherals, bus_hz: u32) {
     chip.RCC.ahb4enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit());
     chip.RCC.apb1lenr().modify(|_, w| w.usart2en().set_bit().usart3en().set_bit().uart4en().set_bit());

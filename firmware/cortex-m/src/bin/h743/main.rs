@@ -1,13 +1,7 @@
 //! The board program for the STM32H743, a Cortex-M7: the second board, to show what a port takes.
 //!
-//! It links and has run on nothing yet. Pins as on the first board; the core runs on its 64 MHz internal oscillator
-//! from the start, so there are no clocks to bring up, and its caches stay off.
-//!
-//! | line | UART | pins | speed |
-//! |---|---|---|---|
-//! | autopilot, MAVLink 2 | USART2 | PA2 out, PA3 in | 921600 |
-//! | radio, reports in COBS | USART3 | PB10 out, PB11 in | 115200 |
-//! | log, defmt | UART4 | PC10 out | 115200 |
+//! It links and has run on nothing yet. Pins and speeds are those of the first board; the core runs on its 64 MHz
+//! internal oscillator from the start, so there are no clocks to bring up, and its caches stay off.
 #![no_std]
 #![no_main]
 #![warn(missing_docs)]
