@@ -56,6 +56,12 @@ const CRITIC_FIRST: u64 = 25;
 /// than this (percent, battery units) is not blown up.
 const PREFERENCE_BINS: usize = 11;
 const SPREAD_MIN: f32 = 0.3;
+/// Advantages beyond this many deviations count as this much: one lost mission must not turn the policy over.
+const ADVANTAGE_MAX: f32 = 4.0;
+/// The longest gradient that is followed.
+const GRADIENT_MAX: f32 = 0.5;
+/// Battery units above the shortest mission at w = (0, 1), in the mean, with which a policy is not offered any more.
+const WASTE_MAX: f32 = 0.005;
 /// Share of the actor that its running average takes over per update.
 const AVERAGING: f32 = 0.03;
 
@@ -329,6 +335,7 @@ impl Refinement {
             },
             &mut gradients,
         );
+        shorten(&mut gradients);
         self.kept.adams[1].lr = rate;
         self.kept.adams[1].step(&mut self.kept.critic, &gradients);
         loss
@@ -355,6 +362,7 @@ impl Refinement {
             },
             &mut gradients,
         );
+        shorten(&mut gradients);
         self.kept.adams[0].lr = rate;
         self.kept.adams[0].step(&mut self.kept.actor, &gradients);
         (entropy, divergence)
@@ -367,7 +375,9 @@ impl Refinement {
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let tables = self.validation.judge(&self.world, &self.kept.averaged)?;
         let score = tables.score();
-        if best.as_ref().is_none_or(|best| score > best.score) {
+        // Hypervolume hardly sees it, but whoever asks for energy alone must get the shortest mission.
+        let is_thrifty = tables.wasted_energy() < WASTE_MAX;
+        if is_thrifty && best.as_ref().is_none_or(|best| score > best.score) {
             *best = Some(Learned {
                 system: System::MosacAtt,
                 method: self.method.clone(),
@@ -449,7 +459,8 @@ fn even_out(lessons: &mut [Lesson]) {
     }
     for lesson in lessons {
         let (squares, count) = sums[bin(lesson)];
-        lesson.advantage /= (squares / count).sqrt().max(SPREAD_MIN);
+        let evened = lesson.advantage / (squares / count).sqrt().max(SPREAD_MIN);
+        lesson.advantage = evened.clamp(-ADVANTAGE_MAX, ADVANTAGE_MAX);
     }
 }
 
@@ -468,6 +479,14 @@ impl Lesson {
             *gradient = -push * (chosen - p) + ENTROPY * p * (policy.log_probability[action] + entropy);
         }
         (entropy, ratio - 1.0 - change)
+    }
+}
+
+/// Scales the gradient down to [`GRADIENT_MAX`] if it is longer.
+fn shorten(gradient: &mut [f32]) {
+    let length = gradient.iter().map(|x| x * x).sum::<f32>().sqrt();
+    if length > GRADIENT_MAX {
+        gradient.iter_mut().for_each(|x| *x *= GRADIENT_MAX / length);
     }
 }
 

@@ -22,6 +22,16 @@ impl Tables {
     pub fn score(&self) -> f64 {
         self.0.iter().map(|(_, table)| table.hypervolume).sum::<f64>() / self.0.len().max(1) as f64
     }
+
+    /// Battery units used at w = (0, 1) beyond the shortest mission, summed over the scenarios.
+    #[must_use]
+    pub fn wasted_energy(&self) -> f32 {
+        let wasted = |(name, table): &(String, Table)| {
+            let shortest = name.parse::<ScenarioKind>().map_or(0, |kind| kind.scenario().shortest_moves());
+            table.least_energy() - shortest as f32
+        };
+        self.0.iter().map(wasted).sum()
+    }
 }
 
 /// The realizations that choose the best parameters: other ones than those that are trained on and those that judge.
