@@ -4,5 +4,6 @@
 //! - **judge**: a program that is not ours and says whether ours is right.
 
 pub mod board;
+pub mod observations;
 pub mod programs;
 pub mod python;

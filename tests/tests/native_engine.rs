@@ -1,17 +1,182 @@
 //! The native engine against tract: one model, two engines, the same decisions.
 
-use gleaner_policy::native::WeightFormat;
-use gleaner_policy::onnx::convert;
+use gleaner_host_trainer::export::read_actor;
+use gleaner_policy::native::{AlignedBytes, Model, NativePolicy, WeightFormat, Workspace};
+use gleaner_policy::onnx::{TractPolicy, convert};
+use gleaner_policy::{FIRST_DEVICE_TOKEN, GOLDEN_TOLERANCE, Inference, K_MAX, Policy, Tokens};
+use gleaner_tests::observations::{flown, random};
 use gleaner_tests::programs::repository;
+use gleaner_units::ActionMask;
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::thread;
+
+const RANDOM: usize = 100_000;
+const FLOWN: usize = 10_000;
+
+fn shipped(name: &str) -> Vec<u8> {
+    std::fs::read(repository().join("models").join(name)).expect("a file of models/")
+}
+
+fn blob(format: WeightFormat) -> AlignedBytes {
+    AlignedBytes::new(&convert(&shipped("gleaner.onnx"), format).expect("a model that can be converted"))
+}
+
+/// Lets `ask` use the engine with the shipped model.
+fn with_native<T>(format: WeightFormat, ask: impl FnOnce(&mut NativePolicy<'_>) -> T) -> T {
+    let blob = blob(format);
+    let mut workspace = Workspace::new();
+    let model = Model::read(blob.as_slice()).expect("a blob that was just made");
+    ask(&mut NativePolicy::new(model, &mut workspace))
+}
+
+/// How far two engines are apart.
+#[derive(Clone, Copy, Debug, Default)]
+struct Apart {
+    logits: f32,
+    attention: f32,
+    decisions: usize,
+}
+
+impl Apart {
+    fn add(&mut self, a: &Inference, b: &Inference, mask: ActionMask) {
+        let largest = |a: &[f32], b: &[f32]| {
+            a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |largest, apart| {
+                if apart.is_nan() { f32::INFINITY } else { f32::max(largest, apart) }
+            })
+        };
+        self.logits = self.logits.max(largest(&a.logits, &b.logits));
+        let attention = largest(a.attention.0.as_flattened(), b.attention.0.as_flattened());
+        self.attention = self.attention.max(attention);
+        self.decisions += usize::from(mask.argmax(&a.logits) != mask.argmax(&b.logits));
+    }
+
+    fn join(self, other: Apart) -> Apart {
+        Apart {
+            logits: self.logits.max(other.logits),
+            attention: self.attention.max(other.attention),
+            decisions: self.decisions + other.decisions,
+        }
+    }
+}
+
+/// Asks both engines, on every processor.
+fn compare(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apart {
+    let threads = thread::available_parallelism().map_or(1, usize::from);
+    thread::scope(|scope| {
+        let parts = questions.chunks(questions.len().div_ceil(threads));
+        let parts: Vec<_> = parts.map(|part| scope.spawn(move || compare_here(format, part))).collect();
+        parts.into_iter().map(|part| part.join().expect("no panic")).fold(Apart::default(), Apart::join)
+    })
+}
+
+fn compare_here(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apart {
+    let mut tract = TractPolicy::load_checked(&shipped("gleaner.onnx")).expect("the model proves itself");
+    with_native(format, |native| {
+        let mut apart = Apart::default();
+        for (tokens, mask) in questions {
+            let (a, b) = (tract.infer(tokens).expect("an answer"), native.infer(tokens).expect("an answer"));
+            apart.add(&a, &b, *mask);
+        }
+        apart
+    })
+}
 
 /// ONNX is the only source: what is flashed is made from what was trained.
 #[test]
 fn the_committed_blob_is_the_conversion_of_the_committed_model() {
-    let read = |name: &str| std::fs::read(repository().join("models").join(name)).expect("a file of models/");
-    let converted = convert(&read("gleaner.onnx"), WeightFormat::F32).expect("a model that can be converted");
     assert!(
-        converted == read("gleaner.gln"),
+        blob(WeightFormat::F32).as_slice() == shipped("gleaner.gln"),
         "models/gleaner.gln is not made from models/gleaner.onnx: type cargo run --release -p gleaner-companion -- \
          convert models/gleaner.onnx --out models/gleaner.gln"
     );
+}
+
+#[test]
+fn on_random_observations_both_engines_decide_alike() {
+    let mut rng = ChaCha8Rng::seed_from_u64(404);
+    let observations = random(&mut rng, RANDOM);
+    let mut mask = || ActionMask::from_bits(rng.random_range(1..32));
+    let questions: Vec<_> = observations.into_iter().map(|tokens| (tokens, mask())).collect();
+    let apart = compare(WeightFormat::F32, &questions);
+    println!("{RANDOM} random observations: {apart:?}");
+    assert!(apart.logits <= GOLDEN_TOLERANCE && apart.attention <= GOLDEN_TOLERANCE, "{apart:?}");
+    assert_eq!(apart.decisions, 0, "other decisions: {apart:?}");
+}
+
+#[test]
+fn on_flown_observations_both_engines_decide_alike() {
+    let actor = read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights");
+    let questions = flown(&actor, FLOWN);
+    let apart = compare(WeightFormat::F32, &questions);
+    println!("{FLOWN} flown observations: {apart:?}");
+    assert!(apart.logits <= GOLDEN_TOLERANCE && apart.attention <= GOLDEN_TOLERANCE, "{apart:?}");
+    assert_eq!(apart.decisions, 0, "other decisions: {apart:?}");
+}
+
+/// Half the flash for less than one decision in a thousand.
+#[test]
+fn with_16_bits_the_same_is_decided_nearly_always() {
+    let actor = read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights");
+    let apart = compare(WeightFormat::I16, &flown(&actor, FLOWN));
+    println!("{FLOWN} flown observations, 16 bits: {apart:?}");
+    assert!(apart.decisions * 1000 <= FLOWN, "other decisions: {apart:?}");
+}
+
+#[test]
+fn the_order_of_the_devices_means_nothing() {
+    let mut rng = ChaCha8Rng::seed_from_u64(12);
+    let observations = random(&mut rng, 20 * (K_MAX + 1));
+    with_native(WeightFormat::F32, |native| {
+        for tokens in observations {
+            let mut order: Vec<usize> = (0..tokens.devices.len()).collect();
+            order.shuffle(&mut rng);
+            let mut shuffled = tokens.clone();
+            shuffled.devices = order.iter().map(|&from| tokens.devices[from]).collect();
+            let [a, mut b] = [native.infer(&tokens).unwrap(), native.infer(&shuffled).unwrap()];
+            // Back into the order of `tokens`.
+            let place: Vec<usize> =
+                (0..FIRST_DEVICE_TOKEN).chain(order.iter().map(|from| FIRST_DEVICE_TOKEN + from)).collect();
+            let mixed = b.attention.clone();
+            for (row, &query) in mixed.0.iter().zip(&place) {
+                for (weight, &key) in row.iter().zip(&place) {
+                    b.attention.0[query][key] = *weight;
+                }
+            }
+            let mut apart = Apart::default();
+            apart.add(&a, &b, ActionMask::FULL);
+            assert!(apart.logits < 2e-5 && apart.attention < 2e-5, "{order:?}: {apart:?}");
+        }
+    });
+}
+
+/// Lanes of absent devices hold what an earlier observation left there; nobody may see it.
+#[test]
+fn absent_devices_and_earlier_questions_leave_no_trace() {
+    let mut rng = ChaCha8Rng::seed_from_u64(13);
+    let observations = random(&mut rng, 4 * (K_MAX + 1));
+    let mut full = observations[K_MAX].clone();
+    assert_eq!(full.devices.len(), K_MAX);
+    let mut endless = full.clone();
+    endless.uav[0] = f32::INFINITY;
+    full.devices.iter_mut().flatten().for_each(|number| *number *= 1e6);
+    for format in WeightFormat::ALL {
+        for tokens in &observations {
+            let fresh = with_native(format, |native| native.infer(tokens).unwrap());
+            let used = with_native(format, |native| {
+                native.infer(&full).unwrap();
+                assert!(native.infer(&endless).is_err(), "an endless battery has no answer");
+                native.infer(tokens).unwrap()
+            });
+            assert_eq!(fresh, used, "to the last bit, {} devices", tokens.devices.len());
+            let present = FIRST_DEVICE_TOKEN + tokens.devices.len();
+            for (query, row) in used.attention.0.iter().enumerate() {
+                let sum: f32 = row.iter().sum();
+                let expected = if query < present { 1.0 } else { 0.0 };
+                assert!((sum - expected).abs() < 1e-5, "row {query} of {present}: {sum}");
+                assert!(row[present..].iter().all(|&weight| weight == 0.0), "{row:?}");
+            }
+        }
+    }
 }

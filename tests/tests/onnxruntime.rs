@@ -6,8 +6,9 @@ use gleaner_host_trainer::net::{Batch, Shape, Workspace, forward};
 use gleaner_host_trainer::observation::normalise;
 use gleaner_policy::onnx::{INPUTS, TractPolicy};
 use gleaner_policy::{Attention, Inference, K_MAX, Policy, Tokens};
+use gleaner_tests::observations::random;
 use gleaner_tests::python;
-use rand::{Rng, RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 
@@ -15,29 +16,6 @@ use std::path::{Path, PathBuf};
 const TOLERANCE: f32 = 1e-4;
 /// Observations that each network is asked about.
 const OBSERVATIONS: usize = 256;
-
-/// Observations of every size: sample i has i mod 13 devices. Numbers reach beyond what flights make, so that
-/// the clips are exercised; heights are whole metres, as everywhere.
-fn observations(rng: &mut impl Rng) -> Vec<Tokens> {
-    let mut number = |low: f32, high: f32| low + (high - low) * rng.random::<f32>();
-    (0..OBSERVATIONS)
-        .map(|sample| {
-            let w_data = number(0.0, 1.0);
-            let device = |_| {
-                let snr_db = number(-40.0, 35.0);
-                let reachable = f32::from(u8::from(snr_db >= 5.0));
-                [number(-800.0, 800.0), number(-600.0, 600.0), number(0.0, 8000.0), snr_db, reachable]
-            };
-            let devices = (0..sample % (K_MAX + 1)).map(device).collect();
-            Tokens {
-                uav: [number(0.0, 80.0), number(0.0, 80.0), number(-800.0, 800.0), number(-600.0, 600.0)],
-                preference: [w_data, 1.0 - w_data],
-                local_map: (0..100).map(|_| number(0.0, 51.0).floor()).collect(),
-                devices,
-            }
-        })
-        .collect()
-}
 
 fn ask_trainer(actor: &[f32], observations: &[Tokens]) -> Vec<Inference> {
     let mut batch = Batch::new();
@@ -136,7 +114,7 @@ fn assert_attention_is_masked(engine: &str, answers: &[Inference], observations:
 
 /// Asks all engines and compares each with the trainer.
 fn assert_all_agree(what: &str, file: &[u8], actor: &[f32]) {
-    let observations = observations(&mut ChaCha8Rng::seed_from_u64(11));
+    let observations = random(&mut ChaCha8Rng::seed_from_u64(11), OBSERVATIONS);
     let trainer = ask_trainer(actor, &observations);
     let engines =
         [("tract", ask_tract(file, &observations)), ("onnxruntime", ask_onnxruntime(file, &observations))];
@@ -157,7 +135,7 @@ fn fresh_networks_answer_alike_in_every_engine() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut actor = Shape::actor().initialise(&mut rng);
         actor.iter_mut().for_each(|number| *number *= sharpness);
-        let goldens = golden_pairs(&actor, Shape::actor(), &observations(&mut rng)[..16]);
+        let goldens = golden_pairs(&actor, Shape::actor(), &random(&mut rng, 16));
         let card = ModelCard { name: what.into(), ..ModelCard::default() };
         let file = export(&actor, Shape::actor(), &card, &goldens).expect("a model");
         assert_eq!(read_actor(&file).expect("its weights"), actor);
