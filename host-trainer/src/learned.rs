@@ -38,7 +38,7 @@ pub struct Learned {
     pub update: u64,
     /// Slots flown until then.
     pub steps: u64,
-    /// Mean hypervolume on the validation realizations.
+    /// [`crate::validation::Tables::score`] on the validation realizations.
     pub score: f64,
 }
 

@@ -60,8 +60,6 @@ const SPREAD_MIN: f32 = 0.3;
 const ADVANTAGE_MAX: f32 = 4.0;
 /// The longest gradient that is followed.
 const GRADIENT_MAX: f32 = 0.5;
-/// Battery units above the shortest mission at w = (0, 1), in the mean, with which a policy is not offered any more.
-const WASTE_MAX: f32 = 0.005;
 /// Share of the actor that its running average takes over per update.
 const AVERAGING: f32 = 0.03;
 
@@ -375,9 +373,7 @@ impl Refinement {
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let tables = self.validation.judge(&self.world, &self.kept.averaged)?;
         let score = tables.score();
-        // Hypervolume hardly sees it, but whoever asks for energy alone must get the shortest mission.
-        let is_thrifty = tables.wasted_energy() < WASTE_MAX;
-        if is_thrifty && best.as_ref().is_none_or(|best| score > best.score) {
+        if best.as_ref().is_none_or(|best| score > best.score) {
             *best = Some(Learned {
                 system: System::MosacAtt,
                 method: self.method.clone(),

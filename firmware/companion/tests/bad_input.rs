@@ -217,7 +217,7 @@ fn command_lines() {
         gleaner.args(args);
         gleaner
     };
-    says(&refused(&mut gleaner(&[])), &["give a command, `gleaner run`"]);
+    says(&refused(&mut gleaner(&[])), &["give a command, for example `gleaner check`"]);
     says(&refused(&mut gleaner(&["fly"])), &["unrecognized subcommand 'fly'", "see `gleaner --help`"]);
     says(&refused(&mut gleaner(&["run", "--modle", "x"])), &["unexpected argument '--modle'"]);
     says(&refused(&mut gleaner(&["run"])), &["no model is set: give --model"]);

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// A number in plain decimal notation with up to three decimal places, rounded half away from zero; with `{:#}` a
+/// A number in plain decimal notation with up to three decimal places, rounded half to even as `core` does; with `{:#}` a
 /// fraction of zero is left out. What is no number, or beyond a thousand million, is a dash.
 ///
 /// The formatting of floats in `core` is exact for every number there is, takes 10 KB of flash, and can panic as far
@@ -14,7 +14,7 @@ impl<const PLACES: usize> fmt::Display for Decimal<PLACES> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const { assert!(PLACES <= 3) };
         let scale = const { 10_u64.pow(PLACES as u32) };
-        let scaled = libm::round(f64::from(self.0).abs() * scale as f64);
+        let scaled = libm::rint(f64::from(self.0).abs() * scale as f64);
         // Written so that NaN is a dash.
         if !(scaled < 1e12) {
             return f.write_str("-");

@@ -1,10 +1,14 @@
 //! `gleaner-train evaluate`.
 
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{Engine, Table, evaluate, evaluate_greedy, realizations};
+use gleaner_host_trainer::evaluation::{
+    Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
+};
+use gleaner_host_trainer::oracle::{Thoroughness, consult};
+use gleaner_host_trainer::planner::Rates;
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
-use gleaner_world::{ScenarioKind, World};
+use gleaner_world::{Channel, City, Realization, ScenarioKind, Seed, World};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,9 +29,16 @@ pub struct Arguments {
     /// Battery units at the start, B.
     #[arg(long, default_value_t = 80)]
     battery: u16,
-    /// Evaluation realizations, numbers 0 to N - 1.
+    /// Evaluation realizations, numbers 0 to N - 1, in each city.
     #[arg(long, default_value_t = 100)]
     realizations: u64,
+    /// Fly over so many generated cities, numbers 0 to N - 1, in which nothing was ever trained, instead of the default
+    /// one.
+    #[arg(long)]
+    cities: Option<u64>,
+    /// The oracle too, with so many tours for each search; 100,000 take about a second per mission.
+    #[arg(long, value_name = "TOURS")]
+    oracle: Option<u32>,
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
@@ -37,22 +48,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
         bail!("--realizations 0: nothing to fly; give at least 1");
     }
-    let world = Arc::new(World::default_world());
-    let scenario = arguments
-        .scenario
-        .scenario()
-        .with_devices(arguments.devices)
-        .with_battery(BatteryUnits(f32::from(arguments.battery)));
-    let drawn = realizations(&world, &scenario, arguments.realizations)?;
-    let mut systems = vec![("GREEDY".to_owned(), evaluate_greedy(&world, &drawn))];
+    if arguments.cities == Some(0) {
+        bail!("--cities 0: nowhere to fly; give at least 1, or leave it out for the default city");
+    }
+    let places = places(arguments)?;
+    let mut systems =
+        vec![("GREEDY".to_owned(), over(&places, |world, drawn| Ok(fly_greedy(world, drawn)))?)];
+    if let Some(tours) = arguments.oracle {
+        systems
+            .push(("oracle".to_owned(), over(&places, |world, drawn| Ok(consult_all(world, drawn, tours)))?));
+    }
     if let Some(folder) = &arguments.run {
         let learned = learned(folder)?;
         let mut decider = learned.decider();
-        systems.push((format!("{}", folder.display()), evaluate(&world, &drawn, &mut *decider)?));
+        let table =
+            over(&places, |world, drawn| Ok(fly_all(world, drawn, &test_preferences(), &mut *decider)?))?;
+        systems.push((format!("{}", folder.display()), table));
     }
     if let Some(path) = &arguments.model {
         let mut policy = super::export::load_model(path)?;
-        systems.push((format!("{}", path.display()), evaluate(&world, &drawn, &mut Engine(&mut policy))?));
+        let table = over(&places, |world, drawn| {
+            Ok(fly_all(world, drawn, &test_preferences(), &mut Engine(&mut policy))?)
+        })?;
+        systems.push((format!("{}", path.display()), table));
     }
     if arguments.json {
         let object: serde_json::Map<_, _> = systems
@@ -61,8 +79,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             .collect::<Result<_>>()?;
         println!("{}", serde_json::Value::Object(object));
     } else {
+        let cities =
+            arguments.cities.map_or(String::new(), |count| format!(" in each of {count} generated cities"));
         println!(
-            "{}, K = {}, B = {}, {} realizations",
+            "{}, K = {}, B = {}, {} realizations{cities}",
             arguments.scenario, arguments.devices, arguments.battery, arguments.realizations
         );
         for (name, table) in &systems {
@@ -70,6 +90,57 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// A city, and the missions to fly over it.
+type Place = (Arc<World>, Vec<(Seed, Realization)>);
+
+fn places(arguments: &Arguments) -> Result<Vec<Place>> {
+    let scenario = arguments
+        .scenario
+        .scenario()
+        .with_devices(arguments.devices)
+        .with_battery(BatteryUnits(f32::from(arguments.battery)));
+    let worlds = match arguments.cities {
+        None => vec![World::default_world()],
+        Some(count) => {
+            (0..count).map(|number| World::new(City::generate(number), Channel::default())).collect()
+        }
+    };
+    worlds
+        .into_iter()
+        .map(|world| {
+            let drawn = realizations(&world, &scenario.in_city(world.city()), arguments.realizations)?;
+            Ok((Arc::new(world), drawn))
+        })
+        .collect()
+}
+
+/// One table over all places. GREEDY may choose its parameterisation anew in each.
+fn over(
+    places: &[Place],
+    mut fly: impl FnMut(&Arc<World>, &[(Seed, Realization)]) -> Result<Missions>,
+) -> Result<Table> {
+    let mut all = Missions(vec![Vec::new(); test_preferences().len()]);
+    for (world, drawn) in places {
+        for (all, missions) in all.0.iter_mut().zip(fly(world, drawn)?.0) {
+            all.extend(missions);
+        }
+    }
+    Ok(all.table())
+}
+
+/// The oracle's plans, by preference and mission.
+fn consult_all(world: &Arc<World>, drawn: &[(Seed, Realization)], tours: u32) -> Missions {
+    let rates = Rates::new(Arc::clone(world));
+    let mut missions = Missions(vec![Vec::new(); test_preferences().len()]);
+    for (_, realization) in drawn {
+        for (list, reward) in missions.0.iter_mut().zip(consult(&rates, realization, Thoroughness { tours }))
+        {
+            list.push(reward);
+        }
+    }
+    missions
 }
 
 /// The best parameters of the run in `folder`.

@@ -73,7 +73,7 @@ impl Axis {
         let margin = 0.05 * (high - low).max(1e-6 + high.abs() * 0.02);
         low = fixed[0].unwrap_or(low - margin);
         high = fixed[1].unwrap_or(high + margin).max(low + 1e-6);
-        let step = round_step((high - low) / 5.0);
+        let step = round_step((high - low) / 6.0);
         let first = (low / step - 1e-9).ceil() as i64;
         let last = (high / step + 1e-9).floor() as i64;
         let ticks = (first..=last).map(|index| (index as f64 * step, number(index as f64 * step, step)));
