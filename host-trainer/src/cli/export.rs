@@ -175,13 +175,21 @@ fn summary_row(kind: ScenarioKind, devices: usize, battery: u16, table: &Table, 
 }
 
 fn scenario_name(settings: &Settings) -> String {
-    format!(
+    let usual = format!(
         "default city; RD {:.0} %, RB {:.0} %, other zones {:.0} % of the missions; {:.0} % of them with 1 to 12 \
          devices and 50 to 120 battery units, the others K = 6, B = 80",
         100.0 * settings.share_rd,
         100.0 * settings.share_rb,
         100.0 * (1.0 - settings.share_rd - settings.share_rb),
         100.0 * settings.share_varied
+    );
+    if settings.share_cities == 0.0 {
+        return usual;
+    }
+    format!(
+        "{usual}; {:.0} % of all over generated cities, under a channel that is off by up to 2 dB, half of them with \
+         Rayleigh fading, a tenth of the reports missing",
+        100.0 * settings.share_cities
     )
 }
 
