@@ -12,35 +12,35 @@ pub(crate) struct DistanceField {
 }
 
 impl DistanceField {
-    /// Breadth-first search from `terminal` over the cells of `fence`.
-    pub(crate) fn new(fence: &CellSet, terminal: Cell) -> DistanceField {
-        let mut field = DistanceField { grid: fence.grid(), moves: [UNREACHED; MAX_CELLS] };
-        // Every cell enters the queue at most once, so it cannot overflow.
-        let mut queue = [0_u16; MAX_CELLS];
-        let Some(first) = field.grid.index(terminal) else { return field };
-        queue[0] = first as u16;
-        let (mut head, mut tail) = (0, 1);
-        field.set(terminal, 0);
-        while head < tail {
-            let Some(cell) = queue.get(head).and_then(|&index| field.grid.cell_at(index.into())) else {
-                break;
-            };
-            head += 1;
-            let Some(here) = field.at(cell) else { continue };
-            for action in Action::MOVES {
-                let next = cell.after(action);
-                if fence.contains(next)
-                    && field.at(next).is_none()
-                    && let (Some(slot), Some(index)) = (queue.get_mut(tail), field.grid.index(next))
-                {
-                    // Below MAX_CELLS, which fits.
-                    *slot = index as u16;
-                    tail += 1;
-                    field.set(next, here.saturating_add(1));
+    /// No cell of `grid` reaches anything.
+    pub(crate) const fn unreached(grid: Grid) -> DistanceField {
+        DistanceField { grid, moves: [UNREACHED; MAX_CELLS] }
+    }
+
+    /// Breadth-first search from `terminal` over the cells of `fence`, in place. The frontiers are sets, a quarter of a
+    /// kilobyte each: a queue would take as much stack as the field itself.
+    pub(crate) fn search(&mut self, fence: &CellSet, terminal: Cell) {
+        self.grid = fence.grid();
+        self.moves.fill(UNREACHED);
+        let mut frontier = CellSet::empty(self.grid);
+        frontier.insert(terminal);
+        self.set(terminal, 0);
+        // The longest way is shorter than the number of cells.
+        for moves in 1..=MAX_CELLS as u16 {
+            let mut next_frontier = CellSet::empty(self.grid);
+            for cell in frontier.iter() {
+                for next in Action::MOVES.map(|action| cell.after(action)) {
+                    if fence.contains(next) && self.at(next).is_none() {
+                        self.set(next, moves);
+                        next_frontier.insert(next);
+                    }
                 }
             }
+            if next_frontier.is_empty() {
+                return;
+            }
+            frontier = next_frontier;
         }
-        field
     }
 
     pub(crate) const fn grid(&self) -> Grid {

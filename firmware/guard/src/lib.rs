@@ -71,22 +71,57 @@ impl fmt::Display for GuardError {
 impl core::error::Error for GuardError {}
 
 impl Guard {
+    /// An envelope without room: it allows nothing anywhere, until [`Guard::enclose`].
+    #[must_use]
+    pub const fn closed() -> Guard {
+        Guard {
+            terminal: Cell::new(0, 0),
+            reserve: BatteryUnits(0.0),
+            distances: DistanceField::unreached(Grid::ONE_CELL),
+        }
+    }
+
     /// Works out the distances inside `fence`, a breadth-first search from `terminal`.
     ///
     /// # Errors
     /// See [`GuardError`].
     ///
     /// # Cost
-    /// One visit per cell; 4 KB of stack.
+    /// One visit per cell; 5 KB of stack, of which [`Guard::enclose`] needs one.
     pub fn new(fence: &CellSet, terminal: Cell, reserve: BatteryUnits) -> Result<Guard, GuardError> {
         check_reserve(reserve)?;
+        let mut guard = Guard::closed();
+        guard.enclose(fence, terminal)?;
+        guard.reserve = reserve;
+        Ok(guard)
+    }
+
+    /// Changes fence and terminal, in place; the reserve stays. For a board, whose stack is short.
+    ///
+    /// # Errors
+    /// As [`Guard::check`]; nothing changes.
+    ///
+    /// # Cost
+    /// One visit per cell; 1 KB of stack.
+    pub fn enclose(&mut self, fence: &CellSet, terminal: Cell) -> Result<(), GuardError> {
+        Guard::check(fence, terminal)?;
+        self.terminal = terminal;
+        self.distances.search(fence, terminal);
+        Ok(())
+    }
+
+    /// Whether a mission inside `fence` can end at `terminal`.
+    ///
+    /// # Errors
+    /// [`GuardError::TerminalOutsideFence`], [`GuardError::TerminalIsolated`].
+    pub fn check(fence: &CellSet, terminal: Cell) -> Result<(), GuardError> {
         if !fence.contains(terminal) {
             return Err(GuardError::TerminalOutsideFence);
         }
         if !Action::MOVES.iter().any(|&action| fence.contains(terminal.after(action))) {
             return Err(GuardError::TerminalIsolated);
         }
-        Ok(Guard { terminal, reserve, distances: DistanceField::new(fence, terminal) })
+        Ok(())
     }
 
     /// Changes the reserve (`GLN_RESERVE`).

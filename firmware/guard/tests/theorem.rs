@@ -177,3 +177,24 @@ fn impossible_envelopes_are_refused() {
     assert_eq!(guard.set_reserve(BatteryUnits(f32::INFINITY)), Err(GuardError::Reserve));
     assert_eq!(guard.reserve(), BatteryUnits(1.0));
 }
+
+#[test]
+fn an_envelope_in_place_is_a_new_one_and_a_closed_one_allows_nothing() {
+    let mut guard = Guard::closed();
+    assert!(guard.mask(Cell::new(0, 0), BatteryUnits(100.0)).is_empty());
+    guard.set_reserve(BatteryUnits(2.0)).unwrap();
+    let large = CellSet::full(grid(40, 30));
+    let mut small = CellSet::full(grid(7, 5));
+    small.remove(Cell::new(3, 0));
+    // The second is smaller: nothing of the first may be left.
+    for (fence, terminal) in [(large, Cell::new(30, 18)), (small, Cell::new(0, 0))] {
+        guard.enclose(&fence, terminal).unwrap();
+        assert_eq!(guard.enclose(&fence, Cell::new(-1, 0)), Err(GuardError::TerminalOutsideFence));
+        let fresh = Guard::new(&fence, terminal, BatteryUnits(2.0)).unwrap();
+        for cell in grid(41, 31).cells() {
+            assert_eq!(guard.distance(cell), fresh.distance(cell));
+            assert_eq!(guard.mask(cell, BatteryUnits(20.0)), fresh.mask(cell, BatteryUnits(20.0)));
+        }
+        assert_eq!((guard.terminal(), guard.reserve()), (terminal, BatteryUnits(2.0)));
+    }
+}

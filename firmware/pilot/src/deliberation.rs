@@ -20,27 +20,30 @@ pub(crate) struct Deliberation<'a> {
     pub(crate) battery: BatteryUnits,
 }
 
+/// Lets the policy take `decision`: its best action among those that the guard allows. In place, because a decision
+/// is two kilobytes, and the stack is at its deepest here.
+///
+/// # Errors
+/// [`ReturnReason::Policy`]: the engine failed, or a logit is not a finite number. A model that answers nonsense
+/// for one action is not believed for the others. The decision is then void.
+///
+/// # Cost
+/// One inference.
+pub(crate) fn ask<P: Policy>(policy: &mut P, decision: &mut Decision) -> Result<(), ReturnReason> {
+    let answer = policy.infer(&decision.tokens).map_err(|_| ReturnReason::Policy);
+    let inference = decision.inference.insert(answer?);
+    if !inference.logits.iter().all(|logit| logit.is_finite()) {
+        return Err(ReturnReason::Policy);
+    }
+    decision.action = decision.mask.argmax(&inference.logits).ok_or(ReturnReason::Policy)?;
+    decision.attended = inference.attention.most_attended(&decision.slots);
+    Ok(())
+}
+
 impl Deliberation<'_> {
-    /// The policy's best action among those that the guard allows.
-    ///
-    /// # Errors
-    /// [`ReturnReason::Policy`]: the engine failed, or a logit is not a finite number. A model that answers
-    /// nonsense for one action is not believed for the others.
-    ///
-    /// # Cost
-    /// One inference.
-    pub(crate) fn by_policy<P: Policy>(&self, policy: &mut P) -> Result<Decision, ReturnReason> {
-        let mask = self.guard.mask(self.cell, self.battery);
-        // Never chosen unless the policy answers: the action below replaces it.
-        let mut decision = self.draft(Action::Hover, mask);
-        let inference = policy.infer(&decision.tokens).map_err(|_| ReturnReason::Policy)?;
-        if !inference.logits.iter().all(|logit| logit.is_finite()) {
-            return Err(ReturnReason::Policy);
-        }
-        decision.action = mask.argmax(&inference.logits).ok_or(ReturnReason::Policy)?;
-        decision.attended = inference.attention.most_attended(&decision.slots);
-        decision.inference = Some(inference);
-        Ok(decision)
+    /// A decision for the policy to take, with [`ask`]: to hover, until then.
+    pub(crate) fn open(&self) -> Decision {
+        self.draft(Action::Hover, self.guard.mask(self.cell, self.battery))
     }
 
     /// The first move of the shortest way to the terminal; `None` on the terminal and where there is no way.

@@ -1,6 +1,6 @@
 //! Engaged and homing: the two states that move the aircraft, and how they give it back.
 
-use crate::deliberation::Deliberation;
+use crate::deliberation::{Deliberation, ask};
 use crate::engagement::Plan;
 use crate::leg::{Leg, Progress, Purpose};
 use crate::machine::{Phase, preference};
@@ -144,6 +144,9 @@ impl Flight {
 }
 
 impl Machine {
+    // This, `homing` and `shadow` each hold a decision of two kilobytes, but never at the same time: out of line, the
+    // stack holds one of them, not three.
+    #[inline(never)]
     pub(crate) fn engaged<P: Policy>(
         &mut self,
         now: Instant,
@@ -175,6 +178,7 @@ impl Machine {
         }
     }
 
+    #[inline(never)]
     pub(crate) fn homing(
         &mut self,
         now: Instant,
@@ -224,9 +228,10 @@ impl Machine {
         if !self.guard.is_feasible(flight.leg.cell, flight.battery(inputs)) {
             return flight.go_home(ReturnReason::Battery);
         }
-        match self.deliberation(now, State::Engaged, &flight, inputs).by_policy(policy) {
+        let mut decision = self.deliberation(now, State::Engaged, &flight, inputs).open();
+        match ask(policy, &mut decision) {
             Err(reason) => flight.go_home(reason),
-            Ok(decision) => {
+            Ok(()) => {
                 self.follow(now, &mut flight, decision, inputs, out);
                 Phase::Engaged(flight)
             }

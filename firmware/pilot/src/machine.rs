@@ -52,21 +52,39 @@ impl Machine {
     /// # Errors
     /// The mission cannot be flown.
     pub fn new(mission: Mission, self_test_passed: bool) -> Result<Machine, MissionError> {
-        let guard = mission.guard(BatteryUnits(0.0))?;
-        Ok(Machine {
-            mission,
-            guard,
+        let mut machine = Machine::grounded();
+        machine.load(&mission, self_test_passed)?;
+        Ok(machine)
+    }
+
+    /// A machine in [`State::Boot`] that has no mission and whose self-test counts as failed.
+    pub(crate) const fn grounded() -> Machine {
+        Machine {
+            mission: Mission::nowhere(),
+            guard: Guard::closed(),
             phase: Phase::Boot,
             collected: 0.0,
             sequence: 0,
-            self_test_passed,
+            self_test_passed: false,
             decision: None,
             polled_at: None,
             told_at: None,
             w_data: None,
             preference_changes: 0,
             spent: BatteryUnits(0.0),
-        })
+        }
+    }
+
+    /// Gives a machine that was not polled yet its mission, in place.
+    ///
+    /// # Errors
+    /// The mission cannot be flown; nothing changes.
+    pub(crate) fn load(&mut self, mission: &Mission, self_test_passed: bool) -> Result<(), MissionError> {
+        mission.check()?;
+        self.guard.enclose(&mission.fence, mission.terminal).map_err(MissionError::Guard)?;
+        self.mission.clone_from(mission);
+        self.self_test_passed = self_test_passed;
+        Ok(())
     }
 
     /// One step. Call at 20 Hz or more.

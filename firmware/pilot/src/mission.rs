@@ -82,6 +82,19 @@ impl fmt::Display for MissionError {
 impl core::error::Error for MissionError {}
 
 impl Mission {
+    /// No mission: one cell that nothing may fly over, which [`Mission::check`] refuses.
+    #[must_use]
+    pub const fn nowhere() -> Mission {
+        Mission {
+            heights: HeightMap::flat(Grid::ONE_CELL),
+            fence: CellSet::empty(Grid::ONE_CELL),
+            corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 },
+            terminal: Cell::new(0, 0),
+            budget: BatteryUnits(0.0),
+            devices: Vec::new(),
+        }
+    }
+
     /// The grid of the city.
     #[must_use]
     pub const fn grid(&self) -> Grid {
@@ -99,14 +112,6 @@ impl Mission {
     /// # Errors
     /// The first fault, see [`MissionError`].
     pub fn check(&self) -> Result<(), MissionError> {
-        self.guard(BatteryUnits(0.0)).map(|_| ())
-    }
-
-    /// The envelope of this mission with `reserve` kept back; checks the mission on the way.
-    ///
-    /// # Errors
-    /// As [`Mission::check`].
-    pub fn guard(&self, reserve: BatteryUnits) -> Result<Guard, MissionError> {
         if self.fence.grid() != self.grid() {
             return Err(MissionError::FenceGrid);
         }
@@ -128,6 +133,15 @@ impl Mission {
                 return Err(MissionError::DeviceData { id });
             }
         }
+        Guard::check(&self.fence, self.terminal).map_err(MissionError::Guard)
+    }
+
+    /// The envelope of this mission with `reserve` kept back.
+    ///
+    /// # Errors
+    /// As [`Mission::check`], or the reserve is no number of battery units.
+    pub fn guard(&self, reserve: BatteryUnits) -> Result<Guard, MissionError> {
+        self.check()?;
         Guard::new(&self.fence, self.terminal, reserve).map_err(MissionError::Guard)
     }
 }

@@ -30,6 +30,16 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// As the link wants them.
+    ///
+    /// # Errors
+    /// The ids are impossible.
+    pub fn checked(self) -> Result<gleaner_link::Settings, SettingsError> {
+        gleaner_link::Settings::new(self.system_id.unwrap_or(1), self.component_id)
+    }
+}
+
 /// Why there can be no pilot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OnboardError {
@@ -37,6 +47,8 @@ pub enum OnboardError {
     Mission(MissionError),
     /// The ids are impossible.
     Settings(SettingsError),
+    /// A mission was to be loaded over another, or after the first poll.
+    Begun,
 }
 
 impl fmt::Display for OnboardError {
@@ -44,6 +56,7 @@ impl fmt::Display for OnboardError {
         match self {
             OnboardError::Mission(error) => write!(f, "mission: {error}"),
             OnboardError::Settings(error) => write!(f, "settings: {error}"),
+            OnboardError::Begun => f.write_str("a mission is loaded once, before the first poll"),
         }
     }
 }
@@ -124,34 +137,54 @@ impl<P: Policy> Onboard<P> {
     /// See [`OnboardError`].
     pub fn new(
         mission: Mission,
-        mut parameters: Parameters,
+        parameters: Parameters,
         settings: Settings,
         policy: P,
         self_test: Result<(), SelfTestError>,
     ) -> Result<Onboard<P>, OnboardError> {
+        let mut onboard = Onboard::grounded(parameters, settings.checked()?, policy);
+        onboard.load(&mission, self_test)?;
+        Ok(onboard)
+    }
+
+    /// A pilot at boot that has no mission: it speaks but never engages, as after a failed self-test. A board, whose
+    /// stack is shorter than a pilot is long, begins with this one and then gives it its mission where it stands.
+    pub fn grounded(mut parameters: Parameters, settings: gleaner_link::Settings, policy: P) -> Onboard<P> {
         // 0 is in the parameter's range.
         let _ = parameters.set_id(ParameterId::Enable, Enable::Off.value());
-        let settings = gleaner_link::Settings::new(settings.system_id.unwrap_or(1), settings.component_id)?;
-        let mut ids: Vec<u16, MAX_DEVICES> = Vec::new();
-        for site in &mission.devices {
-            // The capacities are the same.
-            let _ = ids.push(site.id);
-        }
-        let machine = Machine::new(mission, self_test.is_ok())?;
-        // The mission's check has found doubles already.
-        let devices = DeviceTable::new(&ids).map_err(|_| MissionError::DuplicateDevice { id: 0 })?;
-        Ok(Onboard {
-            machine,
+        Onboard {
+            machine: Machine::grounded(),
             policy,
             link: Component::new(settings, parameters),
             radio: ReportDecoder::new(),
-            devices,
+            devices: DeviceTable::empty(),
             knob: (None, Knob::default()),
             refused: Vec::new(),
             tunnel_refused: 0,
             inference_time: None,
             decision_taken: true,
-        })
+        }
+    }
+
+    /// Gives a grounded pilot its mission, before its first poll. `self_test` as in [`Onboard::new`].
+    ///
+    /// # Errors
+    /// [`OnboardError::Mission`] and [`OnboardError::Begun`]; nothing changes.
+    pub fn load(
+        &mut self,
+        mission: &Mission,
+        self_test: Result<(), SelfTestError>,
+    ) -> Result<(), OnboardError> {
+        // A mission that can be flown has a cell inside its fence.
+        if self.state() != State::Boot || !self.machine.mission().fence.is_empty() {
+            return Err(OnboardError::Begun);
+        }
+        self.machine.load(mission, self_test.is_ok())?;
+        for site in &mission.devices {
+            // The capacities are the same, and the mission's check has found doubles already.
+            let _ = self.devices.add(site.id);
+        }
+        Ok(())
     }
 
     /// Bytes from the autopilot's link (which also carries the ground station), in any pieces.

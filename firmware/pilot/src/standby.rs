@@ -1,6 +1,6 @@
 //! Waiting and shadow: the two states that look and do not fly.
 
-use crate::deliberation::Deliberation;
+use crate::deliberation::{Deliberation, ask};
 use crate::engagement::{self, cell_under, usable_battery};
 use crate::flight::{Flight, slot};
 use crate::machine::{Phase, preference};
@@ -120,6 +120,7 @@ pub(crate) struct ShadowWatch {
 
 impl Machine {
     /// Decides when the aircraft comes to the centre of another cell, and after each slot; commands nothing.
+    #[inline(never)]
     pub(crate) fn shadow<P: Policy>(
         &mut self,
         now: Instant,
@@ -140,7 +141,7 @@ impl Machine {
             return Phase::Shadow(watch);
         }
         watch.last = Some((cell, now));
-        let deliberation = Deliberation {
+        let mut decision = Deliberation {
             mission: &self.mission,
             guard: &self.guard,
             devices: inputs.devices,
@@ -151,9 +152,10 @@ impl Machine {
             state: State::Shadow,
             cell,
             battery,
-        };
-        match deliberation.by_policy(policy) {
-            Ok(decision) => self.keep(decision, out),
+        }
+        .open();
+        match ask(policy, &mut decision) {
+            Ok(()) => self.keep(decision, out),
             Err(reason) if !watch.failed => {
                 watch.failed = true;
                 out.say(Severity::Warning, format_args!("gleaner: shadow: {}", reason.text()));

@@ -59,15 +59,28 @@ impl<const N: usize> DeviceTable<N> {
     /// # Errors
     /// See [`TableError`].
     pub fn new(ids: &[u16]) -> Result<DeviceTable<N>, TableError> {
-        let mut table = DeviceTable { devices: Vec::new(), unknown_reports: 0, outdated_reports: 0 };
+        let mut table = DeviceTable::empty();
         for &id in ids {
-            if table.index_of(id).is_some() {
-                return Err(TableError::Twice(id));
-            }
-            let device = Device { id, heard: None, remaining: None };
-            table.devices.push(device).map_err(|_| TableError::TooMany)?;
+            table.add(id)?;
         }
         Ok(table)
+    }
+
+    /// A table without devices.
+    #[must_use]
+    pub const fn empty() -> DeviceTable<N> {
+        DeviceTable { devices: Vec::new(), unknown_reports: 0, outdated_reports: 0 }
+    }
+
+    /// One more device, of which nothing was heard.
+    ///
+    /// # Errors
+    /// See [`TableError`]; nothing changes.
+    pub fn add(&mut self, id: u16) -> Result<(), TableError> {
+        if self.index_of(id).is_some() {
+            return Err(TableError::Twice(id));
+        }
+        self.devices.push(Device { id, heard: None, remaining: None }).map_err(|_| TableError::TooMany)
     }
 
     /// Takes in a report. Values that [`crate::decode_body`] would refuse are taken for an unknown device.

@@ -70,6 +70,15 @@ impl CellSet {
         self.words.iter().all(|&word| word == 0)
     }
 
+    /// The cells in the set, in index order.
+    pub fn iter(&self) -> impl Iterator<Item = Cell> + use<'_> {
+        let words = self.words.iter().enumerate().filter(|(_, bits)| **bits != 0);
+        let indices = words.flat_map(|(at, &bits)| {
+            (0..32).filter(move |bit| bits & (1 << bit) != 0).map(move |bit| at * 32 + bit)
+        });
+        indices.filter_map(|index| self.grid.cell_at(index))
+    }
+
     fn place(&self, cell: Cell) -> Option<(usize, u32)> {
         self.grid.index(cell).map(|index| (index / 32, 1 << (index % 32)))
     }
@@ -91,6 +100,8 @@ mod tests {
         assert!(
             !set.contains(Cell::new(6, 4)) && !set.contains(Cell::new(7, 4)) && set.contains(Cell::new(0, 0))
         );
-        assert!(CellSet::empty(grid).is_empty());
+        let last: std::vec::Vec<Cell> = set.iter().skip(32).collect();
+        assert_eq!(last, [Cell::new(4, 4), Cell::new(5, 4)]);
+        assert!(CellSet::empty(grid).is_empty() && CellSet::empty(grid).iter().next().is_none());
     }
 }

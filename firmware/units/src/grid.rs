@@ -75,6 +75,9 @@ impl fmt::Display for GridError {
 impl core::error::Error for GridError {}
 
 impl Grid {
+    /// One cell of 20 m: the smallest grid, for whoever has none yet.
+    pub const ONE_CELL: Grid = Grid { width: 1, height: 1, cell_m: 20.0 };
+
     /// `width` x `height` cells of `cell` metres a side.
     ///
     /// # Errors

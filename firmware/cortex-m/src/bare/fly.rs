@@ -4,12 +4,12 @@ use super::log::Defmt;
 use super::{fault, flash, lines, now};
 use crate::{Cause, Keeper, LastWords, ResetFlags, Runtime, Timed};
 use core::fmt;
+use core::mem::MaybeUninit;
 use embedded_storage::nor_flash::NorFlash;
 use gleaner_link::Severity;
-use gleaner_pilot::{Mission, Onboard, Parameters, Settings, State, mission_image};
+use gleaner_pilot::{Onboard, Parameters, Settings, State, mission_image};
 use gleaner_policy::native::{BlobError, Model, NativePolicy, Workspace};
 use gleaner_policy::{Inference, Policy, SelfTestError, Tokens, self_test};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap, Metres};
 use heapless::Vec;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -46,7 +46,7 @@ static ONBOARD: StaticCell<Onboard<Timed<Engine>>> = StaticCell::new();
 pub fn fly<B: Board>(board: B) -> ! {
     let before = fault::last_words().told(board.reset_flags());
     fault::keep(LastWords::alive(false));
-    let (mut keeper, news) = Keeper::open(board.flash());
+    let (keeper, news) = Keeper::open(board.flash());
     let (onboard, doubts) = boot(keeper.saved());
     defmt::info!("gleaner {=str} boots", env!("CARGO_PKG_VERSION"));
     if let Some(before) = before {
@@ -58,6 +58,12 @@ pub fn fly<B: Board>(board: B) -> ! {
     if let Some(news) = news {
         onboard.say(Severity::Warning, format_args!("{news}"));
     }
+    run::<B>(onboard, keeper)
+}
+
+/// The main loop. In a function of its own, so that its frame does not lie under those of the boot.
+#[inline(never)]
+fn run<B: Board>(onboard: &mut Onboard<Timed<Engine>>, mut keeper: Keeper<B::Flash>) -> ! {
     let mut runtime = Runtime::new(onboard, lines::link(), lines::radio());
     B::start_watchdog();
     loop {
@@ -93,59 +99,46 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// The pilot with mission and model, and what there is against it. Its frame is gone when the main loop begins.
+/// The pilot with mission and model, and what there is against it. The pilot is built where it stays, and each step has
+/// a frame that is gone before the next: the stack is shorter than a pilot is long.
 #[inline(never)]
-fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<Engine>>, Vec<Doubt, 3>) {
+fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<Engine>>, Vec<Doubt, 2>) {
     let mut doubts = Vec::new();
-    let mut engine = Engine(None);
     let (Some(workspace), Some(place)) = (WORKSPACE.try_take(), ONBOARD.try_uninit()) else {
         fault::end(Cause::Panic { line: line!() })
     };
-    let tested = match Model::read(flash::model()) {
-        Ok(model) => {
-            let mut policy = NativePolicy::new(model, workspace);
-            let tested = self_test(&mut policy, model.goldens());
-            if tested.is_err() {
-                let _ = doubts.push(Doubt::SelfTest);
-            }
-            engine = Engine(Some(policy));
-            tested
-        }
-        Err(error) => {
-            let _ = doubts.push(Doubt::Model(error));
-            Err(SelfTestError::NoGolden)
-        }
-    };
-    let mission = match mission_image::decode(flash::mission()) {
-        Ok(mission) if mission.check().is_ok() => Some(mission),
-        Ok(_) => {
-            let _ = doubts.push(Doubt::Impossible);
-            None
-        }
-        Err(error) => {
-            let _ = doubts.push(Doubt::Mission(error));
-            None
-        }
-    };
-    let tested = if mission.is_some() { tested } else { Err(SelfTestError::NoGolden) };
-    let Some(mission) = mission.or_else(nowhere) else { fault::end(Cause::Panic { line: line!() }) };
-    let engine = Timed::new(engine, now);
-    match Onboard::new(mission, parameters.clone(), Settings::default(), engine, tested) {
-        Ok(onboard) => (place.write(onboard), doubts),
-        Err(_) => fault::end(Cause::Panic { line: line!() }),
+    let policy = engine(workspace).map_err(|doubt| doubts.push(doubt)).ok();
+    let tested = if policy.is_some() { Ok(()) } else { Err(SelfTestError::NoGolden) };
+    let onboard = ground(place, parameters.clone(), Engine(policy));
+    if let Err(doubt) = load(onboard, tested) {
+        let _ = doubts.push(doubt);
     }
+    (onboard, doubts)
 }
 
-/// The smallest mission, flown by nobody: without a mission of its own the pilot still speaks, but its self-test
-/// counts as failed.
-fn nowhere() -> Option<Mission> {
-    let grid = Grid::new(2, 1, Metres(20.0)).ok()?;
-    Some(Mission {
-        heights: HeightMap::flat(grid),
-        fence: CellSet::full(grid),
-        corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 },
-        terminal: Cell::new(0, 0),
-        budget: BatteryUnits(1.0),
-        devices: Vec::new(),
-    })
+/// The engine, if it gives the answers that the model brings along.
+#[inline(never)]
+fn engine(workspace: &'static mut Workspace) -> Result<NativePolicy<'static>, Doubt> {
+    let model = Model::read(flash::model()).map_err(Doubt::Model)?;
+    let mut policy = NativePolicy::new(model, workspace);
+    self_test(&mut policy, model.goldens()).map_err(|_| Doubt::SelfTest)?;
+    Ok(policy)
+}
+
+/// A pilot without mission, in its place for good.
+#[inline(never)]
+fn ground(
+    place: &'static mut MaybeUninit<Onboard<Timed<Engine>>>,
+    parameters: Parameters,
+    engine: Engine,
+) -> &'static mut Onboard<Timed<Engine>> {
+    let Ok(ids) = Settings::default().checked() else { fault::end(Cause::Panic { line: line!() }) };
+    place.write(Onboard::grounded(parameters, ids, Timed::new(engine, now)))
+}
+
+/// The mission in flash to the pilot, which without one speaks but does not fly.
+#[inline(never)]
+fn load(onboard: &mut Onboard<Timed<Engine>>, tested: Result<(), SelfTestError>) -> Result<(), Doubt> {
+    let mission = mission_image::decode(flash::mission()).map_err(Doubt::Mission)?;
+    onboard.load(&mission, tested).map_err(|_| Doubt::Impossible)
 }

@@ -6,7 +6,7 @@
 
 use crate::rig::{CORNER, HOME_DOWN_M, START, Scripted, TERMINAL, mission};
 use gleaner_link::{Component, FrameDecoder, TUNNEL_DECISION, TUNNEL_RADIO_REPORT};
-use gleaner_pilot::{DecisionRecord, Onboard, Parameters, Settings, State};
+use gleaner_pilot::{DecisionRecord, Onboard, OnboardError, Parameters, Settings, State};
 use gleaner_policy::SelfTestError;
 use gleaner_radio::{Report, encode, encode_body};
 use gleaner_units::{Action, Cell, Db, Duration, Instant, Metres, Ned};
@@ -18,6 +18,11 @@ use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkVersion};
 const AUTOPILOT: (u8, u8) = (3, 1);
 const STATION: (u8, u8) = (255, 190);
 const ORIGIN_AMSL_MM: i32 = 584_000;
+
+/// A policy that only hovers.
+fn hovering() -> Scripted {
+    Scripted { actions: Default::default(), then: Action::Hover, fails: false, logit: 1.0, asked: Vec::new() }
+}
 
 /// An ArduCopter that hovers in GUIDED at the start, and everything that came from the pilot.
 struct Bench {
@@ -33,16 +38,10 @@ struct Bench {
 
 impl Bench {
     fn new(self_test: Result<(), SelfTestError>) -> Bench {
-        let policy = Scripted {
-            actions: Default::default(),
-            then: Action::Hover,
-            fails: false,
-            logit: 1.0,
-            asked: Vec::new(),
-        };
         let mut parameters = Parameters::default();
         parameters.set("GLN_ENABLE", 1.0).unwrap();
-        let onboard = Onboard::new(mission(), parameters, Settings::default(), policy, self_test).unwrap();
+        let onboard =
+            Onboard::new(mission(), parameters, Settings::default(), hovering(), self_test).unwrap();
         let position = Bench::centre(START);
         Bench {
             onboard,
@@ -401,4 +400,24 @@ fn a_knob_sets_the_preference_for_everyone_to_see() {
 fn the_whole_pilot_fits_a_small_microcontroller() {
     let bytes = size_of::<Onboard<()>>();
     assert!(bytes <= 32 * 1024, "{bytes} bytes without the engine");
+}
+
+#[test]
+fn a_grounded_pilot_takes_one_mission_and_only_before_its_first_poll() {
+    let grounded =
+        || Onboard::grounded(Parameters::default(), Settings::default().checked().unwrap(), hovering());
+    let mut pilot = grounded();
+    let mut spoilt = mission();
+    spoilt.fence.remove(TERMINAL);
+    assert!(matches!(pilot.load(&spoilt, Ok(())), Err(OnboardError::Mission(_))));
+    assert_eq!(pilot.load(&mission(), Ok(())), Ok(()), "a refused mission leaves no trace");
+    assert_eq!(pilot.load(&mission(), Ok(())), Err(OnboardError::Begun), "one is enough");
+    pilot.poll(Instant::ZERO);
+    assert_eq!(pilot.state(), State::Idle);
+    assert_eq!(pilot.machine().mission(), &mission());
+
+    let mut without = grounded();
+    without.poll(Instant::ZERO);
+    assert_eq!(without.state(), State::Fault, "speaks, never engages");
+    assert_eq!(without.load(&mission(), Ok(())), Err(OnboardError::Begun));
 }
