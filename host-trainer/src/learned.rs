@@ -112,6 +112,13 @@ impl Learned {
         }
     }
 
+    /// Takes the place of `best` if it is better by validation.
+    pub fn offer(self, best: &mut Option<Learned>) {
+        if best.as_ref().is_none_or(|best| self.score > best.score) {
+            *best = Some(self);
+        }
+    }
+
     /// Writes it.
     ///
     /// # Errors

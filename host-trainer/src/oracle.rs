@@ -3,7 +3,7 @@
 
 use crate::evaluation::{Missions, test_preferences};
 use crate::flight::Reward;
-use crate::planner::{DEVICES_MAX, Effort, Problem, Rates, State, Tour};
+use crate::planner::{Effort, Problem, Rates, State, Tour};
 use gleaner_world::Realization;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -43,17 +43,7 @@ pub struct Thoroughness {
 #[must_use]
 pub fn consult(rates: &Rates, realization: &Realization, thoroughness: Thoroughness) -> Vec<Reward> {
     let known = rates.study(realization);
-    let mut remaining = [0.0; DEVICES_MAX];
-    for (remaining, device) in remaining.iter_mut().zip(realization.devices()) {
-        *remaining = device.data_units;
-    }
-    let state = State {
-        cell: realization.start(),
-        hovers_left: (2.0 * realization.battery().0).floor() as i32,
-        remaining,
-        collected: 0.0,
-        over: false,
-    };
+    let state = State::start(realization);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut tour = Tour::default();
     test_preferences()

@@ -372,18 +372,16 @@ impl Refinement {
     /// The network's answer is not a number.
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let tables = self.validation.judge(&self.world, &self.kept.averaged)?;
-        let score = tables.score();
-        if best.as_ref().is_none_or(|best| score > best.score) {
-            *best = Some(Learned {
-                system: System::MosacAtt,
-                method: self.method.clone(),
-                settings: self.settings.clone(),
-                actor: self.kept.averaged.clone(),
-                update: self.kept.update,
-                steps: self.kept.steps,
-                score,
-            });
+        Learned {
+            system: System::MosacAtt,
+            method: self.method.clone(),
+            settings: self.settings.clone(),
+            actor: self.kept.averaged.clone(),
+            update: self.kept.update,
+            steps: self.kept.steps,
+            score: tables.score(),
         }
+        .offer(best);
         Ok(tables)
     }
 

@@ -305,18 +305,16 @@ impl<L: Learner> Run<L> {
         best: &mut Option<Learned>,
     ) -> Result<Progress<L::Losses>, TrainError> {
         let tables = self.validation.tables(&self.world, &mut Trained::<L>::new(&self.averaged))?;
-        let score = tables.score();
-        if best.as_ref().is_none_or(|best| score > best.score) {
-            *best = Some(Learned {
-                system: L::SYSTEM,
-                method: method(L::SYSTEM),
-                settings: self.settings.clone(),
-                actor: self.averaged.clone(),
-                update: self.update,
-                steps: self.steps,
-                score,
-            });
+        Learned {
+            system: L::SYSTEM,
+            method: method(L::SYSTEM),
+            settings: self.settings.clone(),
+            actor: self.averaged.clone(),
+            update: self.update,
+            steps: self.steps,
+            score: tables.score(),
         }
+        .offer(best);
         Ok(Progress { update: self.update, steps: self.steps, losses, tables })
     }
 

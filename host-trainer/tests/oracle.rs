@@ -2,7 +2,7 @@
 
 use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations, test_preferences};
 use gleaner_host_trainer::oracle::{Thoroughness, consult};
-use gleaner_host_trainer::planner::{DEVICES_MAX, Effort, Problem, Rates, State, Tour};
+use gleaner_host_trainer::planner::{Effort, Problem, Rates, State, Tour};
 use gleaner_units::{Action, BatteryUnits};
 use gleaner_world::{Realization, ScenarioKind, Seed, World};
 use rand::SeedableRng;
@@ -10,15 +10,6 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 const QUICK: Thoroughness = Thoroughness { tours: 4_000 };
-
-fn start(realization: &Realization) -> State {
-    let mut remaining = [0.0; DEVICES_MAX];
-    for (remaining, device) in remaining.iter_mut().zip(realization.devices()) {
-        *remaining = device.data_units;
-    }
-    let hovers_left = (2.0 * realization.battery().0) as i32;
-    State { cell: realization.start(), hovers_left, remaining, collected: 0.0, over: false }
-}
 
 #[test]
 fn it_beats_greedy_and_flies_the_shortest_way_for_energy_alone() {
@@ -49,7 +40,7 @@ fn every_tour_can_be_flown_whatever_the_search_comes_up_with() {
         let battery = BatteryUnits(40.0 + 2.0 * number as f32);
         let scenario = kind.scenario().with_devices(1 + number as usize % 12).with_battery(battery);
         let realization = Realization::draw(world.city(), &scenario, Seed::training(number)).unwrap();
-        let (known, state) = (rates.study(&realization), start(&realization));
+        let (known, state) = (rates.study(&realization), State::start(&realization));
         let problem = Problem { known: &known, state: &state, w_data: 0.9 };
         // Hot to the end, so that the tour is whatever came last.
         let hot = Effort { tours: 300, temperatures: [1e6, 1e6] };
@@ -73,7 +64,7 @@ fn what_is_planned_is_what_comes_of_it_in_the_mean() {
     let scenario = ScenarioKind::ReachDestination.scenario().with_devices(1);
     let realization = Realization::draw(world.city(), &scenario, Seed::training(7)).unwrap();
     let known = rates.study(&realization);
-    let mut planned = start(&realization);
+    let mut planned = State::start(&realization);
     planned.remaining[0] = f32::INFINITY;
     let above = realization.devices()[0].cell;
     planned.cell = above;

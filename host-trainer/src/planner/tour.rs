@@ -2,7 +2,8 @@
 
 use super::known::Known;
 use crate::flight::Flight;
-use gleaner_units::{Action, Cell};
+use gleaner_units::{Action, BatteryUnits, Cell};
+use gleaner_world::Realization;
 
 /// What counts as empty, data units: less than a thousandth of a device.
 const EMPTY_UNITS: f32 = 1.0;
@@ -50,16 +51,28 @@ const fn hovers(action: Action) -> i32 {
 }
 
 impl State {
+    /// Where a mission begins.
+    #[must_use]
+    pub fn start(realization: &Realization) -> State {
+        let data = realization.devices().iter().map(|device| device.data_units);
+        State::new(realization.start(), realization.battery(), data)
+    }
+
     /// Where a flight stands.
     #[must_use]
     pub fn of(flight: &Flight) -> State {
         let episode = flight.episode();
+        let data = episode.devices().iter().map(|device| device.remaining_units);
+        State { over: flight.is_over(), ..State::new(episode.uav(), episode.battery(), data) }
+    }
+
+    fn new(cell: Cell, battery: BatteryUnits, data: impl Iterator<Item = f32>) -> State {
         let mut remaining = [0.0; DEVICES_MAX];
-        for (remaining, device) in remaining.iter_mut().zip(episode.devices()) {
-            *remaining = device.remaining_units;
+        for (remaining, units) in remaining.iter_mut().zip(data) {
+            *remaining = units;
         }
-        let hovers_left = (2.0 * episode.battery().0).floor() as i32;
-        State { cell: episode.uav(), hovers_left, remaining, collected: 0.0, over: flight.is_over() }
+        let hovers_left = (2.0 * battery.0).floor() as i32;
+        State { cell, hovers_left, remaining, collected: 0.0, over: false }
     }
 
     /// Flies one slot: whoever is heard best in the mean sends, then the aircraft hovers or moves.
