@@ -5,7 +5,7 @@ use crate::greedy::Greedy;
 use crate::net::{self, Batch, Sample, Shape, Workspace};
 use crate::observation::normalise;
 use crate::pareto::{REFERENCE, hypervolume};
-use gleaner_policy::{Attention, Policy, Preference};
+use gleaner_policy::{Attention, Policy, Preference, View};
 use gleaner_units::Action;
 use gleaner_world::{Realization, Scenario, ScenarioError, Seed, World};
 use serde::{Deserialize, Serialize};
@@ -61,14 +61,29 @@ impl<'a> Network<'a> {
         for sample in samples {
             self.batch.push_sample(&sample);
         }
-        let outputs = net::forward(&self.shape, self.parameters, &self.batch, &mut self.workspace);
+        let outputs = net::answer(&self.shape, self.parameters, &self.batch, &mut self.workspace);
         outputs.as_chunks().0.to_vec()
+    }
+
+    /// The mean logits over all views of these inputs, as they fly.
+    pub fn averaged_logits(&mut self, samples: &[Sample]) -> Vec<[f32; Action::COUNT]> {
+        let mut sums = vec![[0.0; Action::COUNT]; samples.len()];
+        for view in View::ALL {
+            let logits = self.logits(samples.iter().map(|sample| sample.seen(view)));
+            for (sum, logits) in sums.iter_mut().zip(logits) {
+                for action in Action::ALL {
+                    sum[action.index()] += logits[view.action(action).index()] / View::ALL.len() as f32;
+                }
+            }
+        }
+        sums
     }
 }
 
 impl Decider for Network<'_> {
     fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError> {
-        let logits = self.logits(flights.iter().map(|flight| normalise(&flight.tokens())));
+        let samples: Vec<Sample> = flights.iter().map(|flight| normalise(&flight.tokens())).collect();
+        let logits = self.averaged_logits(&samples);
         flights
             .iter()
             .zip(&logits)
@@ -82,7 +97,9 @@ impl Decider for Network<'_> {
     }
 
     fn attention(&mut self, flight: &Flight) -> Result<Option<Attention>, DeciderError> {
-        self.logits([normalise(&flight.tokens())]);
+        self.batch.clear();
+        self.batch.push_sample(&normalise(&flight.tokens()));
+        net::forward(&self.shape, self.parameters, &self.batch, &mut self.workspace);
         Ok(Some(Attention(self.workspace.attention(0))))
     }
 }

@@ -74,7 +74,7 @@ impl Observation {
         let height = NORMALISATIONS.height;
         debug_assert_eq!(self.local_map_m.len(), LOCAL_MAP_CELLS);
         for (normal, &height_m) in sample.local_map.iter_mut().zip(&self.local_map_m) {
-            *normal = height.apply(f32::from(height_m));
+            *normal = 0.5 * height.apply(f32::from(height_m));
         }
         sample.devices[..self.devices.len()].copy_from_slice(&self.devices);
         sample

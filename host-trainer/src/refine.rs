@@ -20,7 +20,7 @@ use crate::settings::Settings;
 use crate::system::System;
 use crate::train::{Learned, Tables, TrainError, Validation};
 use crate::variety::{Setting, Variety};
-use gleaner_policy::Preference;
+use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::{Realization, ScenarioKind, World};
 use rand::{RngExt, SeedableRng};
@@ -90,6 +90,8 @@ pub struct Findings {
 /// A flight in the air, and how it came there.
 struct Going {
     mission: u64,
+    /// How the policy sees it.
+    view: View,
     actions: Vec<u8>,
     flight: Flight,
     prospect: Prospect,
@@ -211,7 +213,8 @@ impl Refinement {
             .with_reports_missing(reports_missing, drawn.seed);
         let mut prospect = Prospect::new(rates.study(&drawn.realization), mission);
         let ahead = prospect.value(&flight);
-        Ok(Going { mission, actions: Vec::new(), flight, prospect, ahead })
+        let view = View::ALL[mission as usize % View::ALL.len()];
+        Ok(Going { mission, view, actions: Vec::new(), flight, prospect, ahead })
     }
 
     fn next_flight(&mut self, index: usize) -> Result<Going, TrainError> {
@@ -241,8 +244,7 @@ impl Refinement {
         for _ in 0..SLOTS {
             self.fly(&mut flown)?;
         }
-        let samples = self.flights.iter().map(|going| going.flight.observe().with(going.flight.preference()));
-        let samples: Vec<Sample> = samples.collect();
+        let samples: Vec<Sample> = self.flights.iter().map(Going::sees).collect();
         let ahead = self.values(&samples);
         let mut lessons = Vec::with_capacity(FLIGHTS * SLOTS);
         for (experiences, ahead) in flown.into_iter().zip(ahead) {
@@ -258,16 +260,15 @@ impl Refinement {
 
     /// One slot of every flight.
     fn fly(&mut self, flown: &mut [Vec<Experience>]) -> Result<(), TrainError> {
-        let samples: Vec<Sample> =
-            self.flights.iter().map(|going| going.flight.observe().with(going.flight.preference())).collect();
+        let samples: Vec<Sample> = self.flights.iter().map(Going::sees).collect();
         let logits = Network::new(Shape::actor(), &self.kept.actor).logits(samples.iter().copied());
         let values = self.values(&samples);
         for (index, ((sample, logits), value)) in samples.into_iter().zip(logits).zip(values).enumerate() {
             let going = &mut self.flights[index];
-            let mask = going.flight.mask();
+            let mask = going.mask();
             let policy = Distribution::new(&logits, mask);
             let action = policy.pick(self.rng.random());
-            let gain = going.step(action);
+            let gain = going.step(going.meant(action));
             let over = going.flight.is_over();
             let log_probability = policy.log_probability[action.index()];
             flown[index].push(Experience { sample, mask, action, log_probability, gain, value, over });
@@ -397,6 +398,20 @@ impl Refinement {
 }
 
 impl Going {
+    fn sees(&self) -> Sample {
+        self.flight.observe().with(self.flight.preference()).seen(self.view)
+    }
+
+    /// What the guard allows, as it looks in the view.
+    fn mask(&self) -> ActionMask {
+        self.flight.mask().iter().fold(ActionMask::EMPTY, |mask, action| mask.with(self.view.action(action)))
+    }
+
+    /// The action that is called this in the view.
+    fn meant(&self, seen: Action) -> Action {
+        Action::ALL.into_iter().find(|&action| self.view.action(action) == seen).unwrap_or(seen)
+    }
+
     /// Flies a slot; gives what it gained.
     fn step(&mut self, action: Action) -> f32 {
         self.actions.push(action.index() as u8);

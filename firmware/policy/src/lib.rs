@@ -34,6 +34,7 @@ pub mod native;
 pub mod schema;
 mod situation;
 mod tokens;
+mod view;
 
 #[cfg(feature = "std")]
 mod engine;
@@ -45,6 +46,7 @@ pub use engine::{Engine, EngineKind, EngineNameError};
 pub use golden::{GOLDEN_TOLERANCE, Golden, SelfTestError, self_test};
 pub use inference::{Attention, Inference, Policy};
 pub use situation::{DeviceState, Preference, Situation};
+pub use view::View;
 pub use tokens::{Slots, Tokens};
 
 /// The most devices that the model sees at once.

@@ -7,21 +7,18 @@ use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluat
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::net::Shape;
+use gleaner_host_trainer::paper::Setting;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::Learned;
 use gleaner_policy::Tokens;
 use gleaner_policy::onnx::TractPolicy;
-use gleaner_units::BatteryUnits;
 use gleaner_world::{ScenarioKind, World};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
-
-/// The settings in which a card is measured, K and B: the paper's.
-const MEASURED: [(usize, u16); 5] = [(3, 80), (5, 80), (6, 80), (9, 80), (10, 100)];
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -140,21 +137,18 @@ fn card_text(
          |---|---|---|---|---|---|---|---|\n",
     );
     let mut details = String::new();
-    for kind in ScenarioKind::ALL {
-        for (devices, battery) in MEASURED {
-            let scenario =
-                kind.scenario().with_devices(devices).with_battery(BatteryUnits(f32::from(battery)));
-            let drawn = realizations(world, &scenario, arguments.realizations)?;
-            let greedy = evaluate_greedy(world, &drawn);
-            // The flying engine answers one question at a time, the learner's network a thousand.
-            let table = match devices {
-                6 => evaluate(world, &drawn, &mut Engine(policy))?,
-                _ => evaluate(world, &drawn, &mut Network::new(Shape::actor(), &learned.actor))?,
-            };
-            writeln!(summary, "{}", summary_row(kind, devices, battery, &table, &greedy))?;
-            if devices == 6 {
-                writeln!(details, "\n## {kind}, K = 6, B = 80\n\n{}", render(&table))?;
-            }
+    for asked in Setting::ALL {
+        let Setting { kind, devices, battery } = asked;
+        let drawn = realizations(world, &asked.scenario(), arguments.realizations)?;
+        let greedy = evaluate_greedy(world, &drawn);
+        // The flying engine answers one question at a time, the learner's network a thousand.
+        let table = match devices {
+            6 => evaluate(world, &drawn, &mut Engine(policy))?,
+            _ => evaluate(world, &drawn, &mut Network::new(Shape::actor(), &learned.actor))?,
+        };
+        writeln!(summary, "{}", summary_row(kind, devices, battery, &table, &greedy))?;
+        if devices == 6 {
+            writeln!(details, "\n## {kind}, K = 6, B = 80\n\n{}", render(&table))?;
         }
     }
     Ok(text + &summary + &details)

@@ -3,17 +3,14 @@
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{Missions, realizations, test_preferences};
 use gleaner_host_trainer::oracle::{OracleSetting, Thoroughness, consult};
+use gleaner_host_trainer::paper::Setting;
 use gleaner_host_trainer::planner::Rates;
-use gleaner_units::BatteryUnits;
-use gleaner_world::{ScenarioKind, World};
+use gleaner_world::World;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// The paper's settings: K and B.
-const SETTINGS: [(usize, u16); 5] = [(3, 80), (5, 80), (6, 80), (9, 80), (10, 100)];
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -37,39 +34,36 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut file = OpenOptions::new().create(true).append(true).open(&arguments.out).with_context(at)?;
     let world = Arc::new(World::default_world());
     let rates = Rates::new(Arc::clone(&world));
-    for kind in ScenarioKind::ALL {
-        for (devices, battery) in SETTINGS {
-            let is_done = done.iter().any(|setting| {
-                (setting.scenario.as_str(), setting.devices, setting.battery, setting.realizations)
-                    == (kind.name(), devices, battery, arguments.realizations)
-            });
-            if is_done {
-                println!("{kind} K={devices} B={battery}: in {} already", arguments.out.display());
-                continue;
-            }
-            let scenario =
-                kind.scenario().with_devices(devices).with_battery(BatteryUnits(f32::from(battery)));
-            let mut setting = OracleSetting {
-                scenario: kind.name().to_owned(),
-                devices,
-                battery,
-                realizations: arguments.realizations,
-                missions: Missions(vec![Vec::new(); test_preferences().len()]),
-                upper_bound_percent: Vec::new(),
-            };
-            let bar = bar(arguments.realizations, format!("{kind} K={devices} B={battery}"));
-            for (_, realization) in realizations(&world, &scenario, arguments.realizations)? {
-                let thoroughness = Thoroughness { tours: arguments.tours };
-                let rewards = consult(&rates, &realization, thoroughness);
-                for (list, reward) in setting.missions.0.iter_mut().zip(rewards) {
-                    list.push(reward);
-                }
-                bar.inc(1);
-            }
-            bar.finish_and_clear();
-            writeln!(file, "{}", serde_json::to_string(&setting)?).with_context(at)?;
-            println!("{}", summary(&setting));
+    for asked in Setting::ALL {
+        let Setting { kind, devices, battery } = asked;
+        let is_done = done.iter().any(|setting| {
+            (setting.scenario.as_str(), setting.devices, setting.battery, setting.realizations)
+                == (kind.name(), devices, battery, arguments.realizations)
+        });
+        if is_done {
+            println!("{kind} K={devices} B={battery}: in {} already", arguments.out.display());
+            continue;
         }
+        let mut setting = OracleSetting {
+            scenario: kind.name().to_owned(),
+            devices,
+            battery,
+            realizations: arguments.realizations,
+            missions: Missions(vec![Vec::new(); test_preferences().len()]),
+            upper_bound_percent: Vec::new(),
+        };
+        let bar = bar(arguments.realizations, format!("{kind} K={devices} B={battery}"));
+        for (_, realization) in realizations(&world, &asked.scenario(), arguments.realizations)? {
+            let thoroughness = Thoroughness { tours: arguments.tours };
+            let rewards = consult(&rates, &realization, thoroughness);
+            for (list, reward) in setting.missions.0.iter_mut().zip(rewards) {
+                list.push(reward);
+            }
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        writeln!(file, "{}", serde_json::to_string(&setting)?).with_context(at)?;
+        println!("{}", summary(&setting));
     }
     Ok(())
 }

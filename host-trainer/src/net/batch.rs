@@ -1,6 +1,7 @@
 //! What goes in: samples, and batches packed to the devices that are present.
 
 use super::shape::{DEVICE_FEATURES, DEVICES_MAX, MAP_CELLS, PREFERENCE_FEATURES, UAV_FEATURES};
+use gleaner_policy::View;
 
 /// Normalised features of one device.
 pub type DeviceFeatures = [f32; DEVICE_FEATURES];
@@ -25,6 +26,25 @@ impl Sample {
     #[must_use]
     pub fn devices_present(&self) -> &[DeviceFeatures] {
         &self.devices[..usize::from(self.device_count)]
+    }
+
+    /// The same, turned and mirrored.
+    #[must_use]
+    pub fn seen(&self, view: View) -> Sample {
+        const SIDE: usize = 9;
+        let mut seen = *self;
+        seen.uav[2..].copy_from_slice(&view.offset([self.uav[2], self.uav[3]]));
+        for device in &mut seen.devices {
+            let offset = view.offset([device[0], device[1]]);
+            device[..2].copy_from_slice(&offset);
+        }
+        for row in 0..SIDE {
+            for column in 0..SIDE {
+                let [to, line] = view.place([column, row], SIDE);
+                seen.local_map[line * SIDE + to] = self.local_map[row * SIDE + column];
+            }
+        }
+        seen
     }
 }
 

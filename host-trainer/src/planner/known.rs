@@ -2,6 +2,7 @@
 
 use gleaner_units::{Cell, Db, Grid};
 use gleaner_world::{Realization, World};
+use rand::{Rng, RngExt};
 use std::sync::Arc;
 
 /// Steps of the rate table, and its range: below nothing is carried, above nothing lies.
@@ -61,8 +62,18 @@ impl Rates {
             audible.extend(here.into_iter().map(|(_, link)| link));
             from.push(audible.len() as u32);
         }
+        let mut busyness = 0.0;
+        let busyness = from
+            .array_windows()
+            .map(|&[here, next]| {
+                let heard: f32 = audible[here as usize..next as usize].iter().map(|link| link.units).sum();
+                busyness += heard * heard;
+                busyness
+            })
+            .collect();
         Known {
             grid,
+            busyness,
             audible,
             from,
             terminal: realization.terminal(),
@@ -88,6 +99,8 @@ pub struct Known {
     audible: Vec<Audible>,
     /// Where the cell's part of `audible` begins; one more entry than cells.
     from: Vec<u32>,
+    /// Up to and with each cell, the sum of the squares of what is heard there from all devices together.
+    busyness: Vec<f32>,
     terminal: Cell,
     devices: Vec<Cell>,
     initial_units: f32,
@@ -116,6 +129,14 @@ impl Known {
     #[must_use]
     pub const fn initial_units(&self) -> f32 {
         self.initial_units
+    }
+
+    /// A random cell, the likelier the more is heard there: good tours hover where several devices are in sight.
+    pub fn busy_cell(&self, rng: &mut impl Rng) -> Cell {
+        let most = self.busyness.last().copied().unwrap_or(0.0);
+        let drawn = rng.random::<f32>() * most;
+        let place = self.busyness.partition_point(|&sum| sum <= drawn);
+        self.grid.cell_at(place).unwrap_or(self.terminal)
     }
 
     /// The devices that are heard at a cell, the best in the mean first.

@@ -21,9 +21,9 @@ use rand_chacha::ChaCha8Rng;
 /// the search would have nothing to tell the shorter one by.
 pub const THRIFT: f32 = 0.98;
 /// The search from scratch, when a mission begins.
-const BEGIN: Effort = Effort { tours: 6_000, temperatures: [5.0, 0.1] };
+const BEGIN: Effort = Effort { tours: 6_000, temperatures: [1.0, 0.1] };
 /// The search at every slot, from the tour of the slot before.
-const REFINE: Effort = Effort { tours: 300, temperatures: [0.5, 0.05] };
+const REFINE: Effort = Effort { tours: 250, temperatures: [0.5, 0.05] };
 
 /// What is still to be had in a mission under way, slot by slot.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ impl Prospect {
         let w_data = flight.preference().w_data().min(THRIFT);
         let problem = Problem { known: &self.known, state: &state, w_data };
         let (value, tour) = match self.tour.take() {
-            None => problem.anneal(Tour::default(), BEGIN, &mut self.rng),
+            None => problem.anneal(Tour::default(), if w_data < 0.15 { REFINE } else { BEGIN }, &mut self.rng),
             Some(mut tour) => {
                 // A slot of the dwell is over.
                 if self.cell == Some(state.cell)

@@ -10,6 +10,9 @@ const DWELL_MAX: u8 = 40;
 /// Stops of a tour at most.
 const STOPS_MAX: usize = 24;
 
+/// A stop is sometimes shifted by so many cells.
+const FAR: i16 = 6;
+
 /// How hard to search.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -39,17 +42,18 @@ impl Problem<'_> {
         self.w_data * percent - (1.0 - self.w_data) * energy
     }
 
-    /// The utility of a tour.
-    #[must_use]
-    pub fn value(&self, tour: &Tour) -> f32 {
+    /// The utility of a tour. Stops for which the battery does not last are struck: changes to them would change
+    /// nothing.
+    pub fn settle(&self, tour: &mut Tour) -> f32 {
         let mut end = *self.state;
-        end.finish(self.known, tour);
+        let begun = end.finish(self.known, tour);
+        tour.stops.truncate(begun);
         self.utility(&end)
     }
 
     /// The best tour that is met on a walk that begins at `tour`, and its utility.
-    pub fn anneal(&self, tour: Tour, effort: Effort, rng: &mut impl Rng) -> (f32, Tour) {
-        let mut value = self.value(&tour);
+    pub fn anneal(&self, mut tour: Tour, effort: Effort, rng: &mut impl Rng) -> (f32, Tour) {
+        let mut value = self.settle(&mut tour);
         let mut best = (value, tour.clone());
         let (mut at, mut candidate) = (tour.clone(), tour);
         let [hot, cold] = effort.temperatures;
@@ -59,7 +63,7 @@ impl Problem<'_> {
             temperature *= cooling;
             candidate.clone_from(&at);
             self.change(&mut candidate, rng);
-            let changed = self.value(&candidate);
+            let changed = self.settle(&mut candidate);
             let loss = value - changed;
             if loss <= 0.0 || rng.random::<f32>() < libm::expf(-loss / temperature) {
                 value = changed;
@@ -85,7 +89,7 @@ impl Problem<'_> {
         }
         let index = rng.random_range(0..count);
         let stop = &mut tour.stops[index];
-        match rng.random_range(0..20) {
+        match rng.random_range(0..24) {
             0..=4 => self.nudge(stop, rng),
             5..=8 => {
                 let by = [1, 1, 2, 4][rng.random_range(0..4)];
@@ -116,6 +120,13 @@ impl Problem<'_> {
                 tour.stops.insert(rng.random_range(0..count), stop);
             }
             18 => tour.stops.swap(index, rng.random_range(0..count)),
+            19..=20 => stop.cell = self.known.busy_cell(rng),
+            21 => self.shift(stop, FAR, rng),
+            22 => {
+                let other = tour.stops[rng.random_range(0..count)].cell;
+                let cell = &mut tour.stops[index].cell;
+                *cell = Cell::new((cell.x + other.x) / 2, (cell.y + other.y) / 2);
+            }
             _ => {
                 let other = rng.random_range(0..count);
                 tour.stops[index.min(other)..=index.max(other)].reverse();
@@ -125,6 +136,10 @@ impl Problem<'_> {
 
     fn nudge(&self, stop: &mut Stop, rng: &mut impl Rng) {
         let by = if rng.random_range(0..4) == 0 { 3 } else { 1 };
+        self.shift(stop, by, rng);
+    }
+
+    fn shift(&self, stop: &mut Stop, by: i16, rng: &mut impl Rng) {
         let to =
             Cell::new(stop.cell.x + rng.random_range(-by..=by), stop.cell.y + rng.random_range(-by..=by));
         if self.known.grid().contains(to) {
@@ -132,21 +147,26 @@ impl Problem<'_> {
         }
     }
 
-    /// A stop near a device that still has data.
+    /// A stop where much is heard, or near a device that still has data.
     fn insert(&self, tour: &mut Tour, rng: &mut impl Rng) {
         let devices = self.known.devices();
         if tour.stops.len() >= STOPS_MAX || devices.is_empty() {
             return;
         }
-        let device = rng.random_range(0..devices.len());
-        if self.state.remaining[device] <= 0.0 {
-            return;
-        }
-        let mut stop =
-            Stop { cell: devices[device], slots: rng.random_range(0..=12), east_first: rng.random() };
-        if rng.random() {
-            self.nudge(&mut stop, rng);
-        }
+        let east_first = rng.random();
+        let stop = if rng.random() {
+            Stop { cell: self.known.busy_cell(rng), slots: rng.random_range(0..=30), east_first }
+        } else {
+            let device = rng.random_range(0..devices.len());
+            if self.state.remaining[device] <= 0.0 {
+                return;
+            }
+            let mut stop = Stop { cell: devices[device], slots: rng.random_range(0..=12), east_first };
+            if rng.random() {
+                self.nudge(&mut stop, rng);
+            }
+            stop
+        };
         tour.stops.insert(rng.random_range(0..=tour.stops.len()), stop);
     }
 }

@@ -100,14 +100,16 @@ impl State {
     }
 
     /// Flies the stops as far as the battery lasts, then home. Feasible from a feasible state: a stop is only begun
-    /// if the way home from it is affordable.
-    pub fn finish(&mut self, known: &Known, tour: &Tour) {
+    /// if the way home from it is affordable. Gives the number of stops that were begun.
+    pub fn finish(&mut self, known: &Known, tour: &Tour) -> usize {
         let home = known.terminal();
         let way = |a: Cell, b: Cell| a.manhattan(b) as i32;
+        let mut begun = 0;
         for stop in &tour.stops {
             if self.over || self.hovers_left < 2 * (way(self.cell, stop.cell) + way(stop.cell, home).max(1)) {
                 break;
             }
+            begun += 1;
             self.walk(known, stop.cell, stop.east_first);
             // Hovering on the terminal does not end the mission: out and back.
             let needed = if self.cell == home { 4 } else { 2 * way(self.cell, home) };
@@ -123,6 +125,7 @@ impl State {
             self.slot(known, out.unwrap_or(Action::North));
         }
         self.walk(known, home, tour.east_first);
+        begun
     }
 
     /// Along one axis, then along the other; ends early on the terminal, where a move ends the mission.
