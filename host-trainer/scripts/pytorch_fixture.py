@@ -51,7 +51,7 @@ class Network(nn.Module):
         super().__init__()
         self.project_uav = nn.Linear(4, 64)
         self.project_preference = nn.Linear(2, 64)
-        self.project_map = nn.Linear(100, 64)
+        self.project_map = nn.Linear(81, 64)
         self.project_device = nn.Linear(5, 64)
         self.encoder = nn.ModuleList(
             nn.TransformerEncoderLayer(64, 4, 128, dropout=0.0, batch_first=True, norm_first=False)
@@ -118,7 +118,7 @@ def freeze(outputs):
     network = Network(outputs)
     network.draw(generator)
     count = len(DEVICE_COUNTS)
-    uav, preference, local_map = generator.tensor(count, 4), generator.tensor(count, 2), generator.tensor(count, 100)
+    uav, preference, local_map = generator.tensor(count, 4), generator.tensor(count, 2), generator.tensor(count, 81)
     devices = torch.zeros(count, DEVICES_MAX, 5)
     absent = torch.ones(count, DEVICES_MAX, dtype=torch.bool)
     for sample, present in enumerate(DEVICE_COUNTS):

@@ -1,20 +1,25 @@
-//! Distillation: the actor learns to do what a teacher that knows everything would do, from what it can see.
+//! Distillation: the actor learns to do what a teacher would do, from what it can see itself.
+//!
+//! The teacher is a planner that knows everything; or mentors, policies that have been learned already, each asked in
+//! the eight views of the situation. What a network has learned by accident differs from view to view, so the mean
+//! of its answers is better than each, and a pupil that learns the mean keeps what is better (as ensembles do: Hinton,
+//! Vinyals and Dean 2015).
 //!
 //! The learner flies and the teacher says at every slot what it would have done (DAgger: Ross, Gordon and Bagnell
-//! 2011), so the learner is taught in the states that it gets itself into. The loss is the cross entropy of the
-//! teacher's distribution under the masked policy.
+//! 2011), so the learner is taught in the states that it gets itself into. It sees each lesson in a view drawn at
+//! random. The loss is the cross entropy of the teacher's distribution under the masked policy.
 
 use crate::checkpoint::{self, CheckpointError};
-use crate::evaluation::Network;
+use crate::evaluation::{DeciderError, Network};
 use crate::flight::Flight;
 use crate::mosac::Distribution;
-use crate::net::{self, Adam, Batch, Shape, Workspace};
+use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
 use crate::observation::Observation;
 use crate::settings::Settings;
 use crate::system::System;
 use crate::teacher::{Course, Teacher};
 use crate::train::{Learned, TrainError, Validation};
-use gleaner_policy::Preference;
+use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::{Realization, ScenarioKind, World};
 use rand::{RngExt, SeedableRng};
@@ -54,6 +59,8 @@ pub struct Distillation {
     settings: Settings,
     world: Arc<World>,
     teacher: Teacher,
+    /// Those who teach instead of the planner, if there are any.
+    mentors: Vec<Learned>,
     flights: Vec<(Flight, Course)>,
     shortest: VecDeque<Lesson>,
     kept: Kept,
@@ -62,6 +69,29 @@ pub struct Distillation {
     workspace: Workspace,
     rng: ChaCha8Rng,
     validation: Validation,
+}
+
+fn not_a_number() -> DeciderError {
+    DeciderError("a mentor's answer is not a number".into())
+}
+
+/// The command line that comes here, from the first one on.
+fn method(from: Option<&Learned>, mentors: &[Learned]) -> String {
+    let whole = |learned: &Learned, out: &str| {
+        learned.settings.command_line(&learned.method, out).trim_start_matches("gleaner-train ").to_owned()
+    };
+    let mut method = from.map_or("distil".to_owned(), |from| {
+        format!("{} && gleaner-train distil --from FIRST", whole(from, "FIRST"))
+    });
+    for (index, mentor) in mentors.iter().enumerate() {
+        if from.is_some_and(|from| from.actor == mentor.actor) {
+            method += " --mentor FIRST";
+        } else {
+            let name = format!("MENTOR{index}");
+            method = format!("{} && gleaner-train {method} --mentor {name}", whole(mentor, &name));
+        }
+    }
+    method
 }
 
 /// What the checkpoint keeps. Flights in the air, and the lessons of the shortest mission, begin anew after a kill.
@@ -80,7 +110,8 @@ struct Kept {
 }
 
 impl Distillation {
-    /// Goes on from the checkpoint in `folder`, or starts anew, with the actor of `from` if there is one.
+    /// Goes on from the checkpoint in `folder`, or starts anew, with the actor of `from` if there is one. Mentors take
+    /// the place of the planner.
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
@@ -88,6 +119,7 @@ impl Distillation {
         settings: Settings,
         folder: &Path,
         from: Option<&Learned>,
+        mentors: Vec<Learned>,
     ) -> Result<Distillation, TrainError> {
         let path = folder.join(CHECKPOINT);
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
@@ -120,11 +152,8 @@ impl Distillation {
         let mut run = Distillation {
             teacher: Teacher::new(Arc::clone(&world)),
             validation: Validation::draw(&world, &settings)?,
-            method: from.map_or("distil".into(), |learned| {
-                let before = learned.settings.command_line(&learned.method, "FIRST");
-                let before = before.trim_start_matches("gleaner-train ");
-                format!("{before} && gleaner-train distil --from FIRST")
-            }),
+            method: method(from, &mentors),
+            mentors,
             settings,
             world,
             flights: Vec::new(),
@@ -191,12 +220,20 @@ impl Distillation {
     fn fly(&mut self) -> Result<(), TrainError> {
         let seen: Vec<Observation> = self.flights.iter().map(|(flight, _)| flight.observe()).collect();
         let inputs = self.flights.iter().zip(&seen).map(|((flight, _), seen)| seen.with(flight.preference()));
-        let logits = Network::new(Shape::actor(), &self.kept.actor).logits(inputs);
+        let inputs: Vec<Sample> = inputs.collect();
+        let logits = Network::new(Shape::actor(), &self.kept.actor).logits(inputs.iter().copied());
+        let mentored = self.mentored(&inputs);
         let learner_flies = (self.kept.update as f64 / HAND_OVER as f64).min(0.9);
         for (index, (seen, logits)) in seen.into_iter().zip(logits).enumerate() {
             let (flight, known) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
-            let (advice, taught) = known.teach(flight);
+            let (advice, taught) = match mentored.get(index) {
+                None => known.teach(flight),
+                Some(logits) => {
+                    let advice = mask.argmax(logits).ok_or_else(not_a_number)?;
+                    (advice, Distribution::new(logits, mask).probability)
+                }
+            };
             // As on board: the states to be taught in are those that the finished policy will see.
             let own = mask.argmax(&logits).unwrap_or(advice);
             let action = if self.rng.random_bool(learner_flies) { own } else { advice };
@@ -220,6 +257,26 @@ impl Distillation {
         Ok(())
     }
 
+    /// The mean logits of all mentors in all views; nothing without mentors.
+    fn mentored(&self, inputs: &[Sample]) -> Vec<[f32; Action::COUNT]> {
+        let answers = self.mentors.iter().map(|mentor| {
+            Network::new(Shape::actor(), &mentor.actor).averaged_logits(inputs)
+        });
+        let share = 1.0 / self.mentors.len().max(1) as f32;
+        answers
+            .reduce(|mut sums, answers| {
+                for (sum, answer) in sums.as_flattened_mut().iter_mut().zip(answers.as_flattened()) {
+                    *sum += answer;
+                }
+                sums
+            })
+            .map(|mut sums| {
+                sums.as_flattened_mut().iter_mut().for_each(|logit| *logit *= share);
+                sums
+            })
+            .unwrap_or_default()
+    }
+
     fn learn(&mut self) -> f32 {
         let count = self.settings.batch * self.settings.preferences;
         let lessons: Vec<&Lesson> = (0..count)
@@ -231,9 +288,11 @@ impl Distillation {
                 }
             })
             .collect();
+        let views: Vec<View> =
+            lessons.iter().map(|_| View::ALL[self.rng.random_range(0..View::ALL.len())]).collect();
         self.batch.clear();
-        for lesson in &lessons {
-            self.batch.push_sample(&lesson.seen.with(lesson.preference));
+        for (lesson, &view) in lessons.iter().zip(&views) {
+            self.batch.push_sample(&lesson.seen.with(lesson.preference).seen(view));
         }
         self.gradients.clear();
         self.gradients.resize(self.kept.actor.len(), 0.0);
@@ -246,12 +305,14 @@ impl Distillation {
             &mut self.workspace,
             |range, outputs, gradients| {
                 let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
-                for ((logits, gradients), lesson) in rows.zip(&lessons[range]) {
-                    let policy = Distribution::new(logits, lesson.mask);
-                    for (action, gradient) in gradients.iter_mut().enumerate() {
-                        let taught = lesson.taught[action];
-                        loss -= scale * taught * policy.log_probability[action];
-                        *gradient = scale * (policy.probability[action] - taught);
+                let seen = lessons[range.clone()].iter().zip(&views[range]);
+                for ((logits, gradients), (lesson, view)) in rows.zip(seen) {
+                    let plain = Action::ALL.map(|action| logits[view.action(action).index()]);
+                    let policy = Distribution::new(&plain, lesson.mask);
+                    for action in Action::ALL {
+                        let (index, taught) = (action.index(), lesson.taught[action.index()]);
+                        loss -= scale * taught * policy.log_probability[index];
+                        gradients[view.action(action).index()] = scale * (policy.probability[index] - taught);
                     }
                 }
             },

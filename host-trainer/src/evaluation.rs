@@ -65,7 +65,7 @@ impl<'a> Network<'a> {
         outputs.as_chunks().0.to_vec()
     }
 
-    /// The mean logits over all views of these inputs, as they fly.
+    /// The mean logits over the eight views of these inputs.
     pub fn averaged_logits(&mut self, samples: &[Sample]) -> Vec<[f32; Action::COUNT]> {
         let mut sums = vec![[0.0; Action::COUNT]; samples.len()];
         for view in View::ALL {
@@ -82,8 +82,7 @@ impl<'a> Network<'a> {
 
 impl Decider for Network<'_> {
     fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError> {
-        let samples: Vec<Sample> = flights.iter().map(|flight| normalise(&flight.tokens())).collect();
-        let logits = self.averaged_logits(&samples);
+        let logits = self.logits(flights.iter().map(|flight| normalise(&flight.tokens())));
         flights
             .iter()
             .zip(&logits)

@@ -3,8 +3,8 @@
 use crate::observation::Observation;
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
-use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
-use gleaner_world::{Episode, Realization, ScenarioError, Seed, Stream, World};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet, Metres};
+use gleaner_world::{City, Episode, Realization, ScenarioError, Seed, Stream, World};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -23,18 +23,6 @@ pub struct Flight {
     total: Reward,
     reports: Option<Reports>,
 }
-
-static RATES: std::sync::LazyLock<[[f32; 14]; 14]> = std::sync::LazyLock::new(|| {
-    let channel = gleaner_world::Channel::default();
-    let mut rates = [[0.0; 14]; 14];
-    for (dy, row) in rates.iter_mut().enumerate() {
-        for (dx, rate) in row.iter_mut().enumerate() {
-            let d = libm::sqrtf(((dx * dx + dy * dy) * 400 + 3600) as f32);
-            *rate = channel.data_per_slot(channel.mean_snr(true, gleaner_units::Metres(d)));
-        }
-    }
-    rates
-});
 
 /// What has arrived of the devices' reports, where not all do.
 #[derive(Clone, Debug)]
@@ -101,7 +89,8 @@ impl Flight {
             spare: self.spare(),
             terminal: self.episode.terminal(),
             preference: self.preference,
-            heights: self.episode.world().city().heights(),
+            altitude: Metres(f32::from(City::ALTITUDE_M)),
+            sight: self.episode.world().city(),
         };
         let devices = self.episode.devices().iter().enumerate().map(|(index, device)| {
             let (arrived, remaining) = match &self.reports {
@@ -110,53 +99,7 @@ impl Flight {
             };
             DeviceState { cell: device.cell, remaining, snr: arrived.then_some(device.snr) }
         });
-        let devices: Vec<DeviceState> = devices.collect();
-        let mut tokens = Tokens::build(&situation, devices.iter().copied()).0;
-        self.listen(&mut tokens, &devices);
-        tokens
-    }
-
-    fn listen(&self, tokens: &mut Tokens, devices: &[DeviceState]) {
-        const FROM: [i16; 9] = [-15, -7, -3, -1, 0, 1, 2, 4, 8];
-        const TO: [i16; 9] = [-8, -4, -2, -1, 0, 1, 3, 7, 15];
-        let world = self.episode.world();
-        let grid = world.city().grid();
-        let here = self.episode.uav();
-        let mut field = [[0.0_f32; 31]; 31];
-        let channel = world.channel();
-        let rates = &*RATES;
-        for device in devices {
-            if device.remaining <= 0.0 { continue; }
-            for dy in -13..=13_i16 {
-                let y = device.cell.y + dy;
-                let fy = y - here.y + 15;
-                if !(0..31).contains(&fy) { continue; }
-                for dx in -13..=13_i16 {
-                    let x = device.cell.x + dx;
-                    let fx = x - here.x + 15;
-                    if !(0..31).contains(&fx) { continue; }
-                    let cell = Cell::new(x, y);
-                    let rate = rates[usize::from(dy.unsigned_abs())][usize::from(dx.unsigned_abs())];
-                    if rate > 0.0 && grid.contains(cell) && world.city().line_of_sight(device.cell, cell) {
-                        field[fy as usize][fx as usize] += device.remaining.min(10.0 * rate);
-                    }
-                }
-            }
-        }
-        let _ = channel;
-        tokens.local_map.clear();
-        for row in 0..9 {
-            for column in 0..9 {
-                let mut best = 0.0_f32;
-                for line in &field[(FROM[row] + 15) as usize..=(TO[row] + 15) as usize] {
-                    for value in &line[(FROM[column] + 15) as usize..=(TO[column] + 15) as usize] {
-                        best = best.max(*value);
-                    }
-                }
-                let _ = tokens.local_map.push(libm::floorf(best / 64.0).min(255.0));
-            }
-        }
-        while tokens.local_map.push(0.0).is_ok() {}
+        Tokens::build(&situation, devices).0
     }
 
     /// The same for the replay memory.

@@ -3,7 +3,7 @@
 //!
 //! Four layers, all seen from the aircraft: building heights; the zones, 1 at the start and -1 at the terminal (-1
 //! where they are the same cell, which the paper leaves open); the data left at each device; the aircraft. Outside
-//! the city the heights are those of the schema for "outside", everything else is 0. The global map averages windows
+//! the city the heights are the greatest, everything else is 0. The global map averages windows
 //! of 5 x 5 cells, laid so that the aircraft is in the middle of the middle one: of the 79 x 59 cells that a centred
 //! 40 x 30 city can span, 75 x 55 are seen, and the outermost two on each side are left out.
 
@@ -29,6 +29,9 @@ const LOCAL_REACH: i16 = (LOCAL_SIDE / 2) as i16;
 /// Cells of the global map west and south of the aircraft's window.
 const GLOBAL_MIDDLE: (i16, i16) = ((GLOBAL_SIZE.0 / 2) as i16, (GLOBAL_SIZE.1 / 2) as i16);
 const WINDOW: i16 = GLOBAL_WINDOW as i16;
+/// The height that stands for "outside the city", and the one that the network reads as 1.
+const OUTSIDE_HEIGHT_M: f32 = 50.0;
+const HEIGHT_SCALE_M: f32 = 50.0;
 /// Share of a window's mean that one of its cells has.
 const SHARE: f32 = 1.0 / (GLOBAL_WINDOW * GLOBAL_WINDOW) as f32;
 
@@ -69,8 +72,8 @@ impl Maps {
     /// The height of a cell as the network reads it.
     fn height(&self, cell: Cell) -> f32 {
         let height_m =
-            self.heights.height(cell).map_or(schema::OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
-        schema::HEIGHT.apply(height_m)
+            self.heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
+        height_m / HEIGHT_SCALE_M
     }
 
     /// The mean height of a window as the network reads it.
@@ -85,7 +88,7 @@ impl Maps {
         let sum = |x: usize, y: usize| self.sums_m[y * (width as usize + 1) + x];
         let inside_m = sum(east, north) + sum(west, south) - sum(west, north) - sum(east, south);
         let outside = GLOBAL_WINDOW * GLOBAL_WINDOW - (east - west) * (north - south);
-        schema::HEIGHT.apply(SHARE * (inside_m as f32 + outside as f32 * schema::OUTSIDE_HEIGHT_M))
+        SHARE * (inside_m as f32 + outside as f32 * OUTSIDE_HEIGHT_M) / HEIGHT_SCALE_M
     }
 
     fn paint_heights(&self, uav: Cell, local: &mut [f32; LOCAL_NUMBERS], global: &mut [f32; GLOBAL_NUMBERS]) {

@@ -6,20 +6,23 @@ use gleaner_policy::{LOCAL_MAP_CELLS, Preference, Tokens};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
+/// The steps in which yields enter the model, data units.
+const STEP_UNITS: f32 = 64.0;
+
 /// What the replay memory keeps of a state: everything but the preference, small enough to keep 100,000 of
 /// them. Normalised, except for the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     uav: [f32; 4],
-    /// Building heights, m. On board they are whole metres too.
-    local_map_m: Vec<u8>,
+    /// Yields in steps of [`STEP_UNITS`], as the builder makes them.
+    local_map: Vec<u8>,
     devices: Vec<DeviceFeatures>,
 }
 
 struct Normalisations {
     uav: [Normalisation; 4],
     device: [Normalisation; 5],
-    height: Normalisation,
+    yields: Normalisation,
 }
 
 static NORMALISATIONS: LazyLock<Normalisations> = LazyLock::new(|| {
@@ -28,7 +31,7 @@ static NORMALISATIONS: LazyLock<Normalisations> = LazyLock::new(|| {
     Normalisations {
         uav: of("uav").try_into().expect(matches),
         device: of("devices").try_into().expect(matches),
-        height: of("local_map")[0],
+        yields: of("local_map")[0],
     }
 });
 
@@ -53,7 +56,8 @@ impl Observation {
                 normal
             })
             .collect();
-        Observation { uav, local_map_m: tokens.local_map.iter().map(|&m| m as u8).collect(), devices }
+        let local_map = tokens.local_map.iter().map(|&units| (units / STEP_UNITS) as u8).collect();
+        Observation { uav, local_map, devices }
     }
 
     /// Moves to the terminal: battery minus spare battery.
@@ -71,10 +75,10 @@ impl Observation {
             device_count: self.devices.len() as u8,
             ..Sample::default()
         };
-        let height = NORMALISATIONS.height;
-        debug_assert_eq!(self.local_map_m.len(), LOCAL_MAP_CELLS);
-        for (normal, &height_m) in sample.local_map.iter_mut().zip(&self.local_map_m) {
-            *normal = 0.5 * height.apply(f32::from(height_m));
+        let yields = NORMALISATIONS.yields;
+        debug_assert_eq!(self.local_map.len(), LOCAL_MAP_CELLS);
+        for (normal, &steps) in sample.local_map.iter_mut().zip(&self.local_map) {
+            *normal = yields.apply(f32::from(steps) * STEP_UNITS);
         }
         sample.devices[..self.devices.len()].copy_from_slice(&self.devices);
         sample

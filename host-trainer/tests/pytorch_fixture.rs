@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use gleaner_host_trainer::net::{Adam, Batch, DEVICE_FEATURES, Shape, TOKENS_MAX, Workspace};
+use gleaner_host_trainer::net::{Adam, Batch, DEVICE_FEATURES, MAP_CELLS, Shape, TOKENS_MAX, Workspace};
 use gleaner_host_trainer::net::{Architecture, MapBatch, MapShape, VectorBatch, VectorShape};
 use gleaner_host_trainer::net::{GLOBAL_NUMBERS, LOCAL_NUMBERS, VECTOR_FEATURES, backward, forward};
 
@@ -84,14 +84,14 @@ impl Generator {
     fn batch(&mut self, device_counts: &[usize]) -> Batch {
         let count = device_counts.len();
         let (uav, preference, local_map) =
-            (self.numbers(count * 4), self.numbers(count * 2), self.numbers(count * 100));
+            (self.numbers(count * 4), self.numbers(count * 2), self.numbers(count * MAP_CELLS));
         let mut batch = Batch::new();
         for (sample, &present) in device_counts.iter().enumerate() {
             let devices = self.numbers(present * DEVICE_FEATURES);
             batch.push(
                 uav[sample * 4..][..4].try_into().unwrap(),
                 preference[sample * 2..][..2].try_into().unwrap(),
-                local_map[sample * 100..][..100].try_into().unwrap(),
+                local_map[sample * MAP_CELLS..][..MAP_CELLS].try_into().unwrap(),
                 devices.as_chunks().0,
             );
         }

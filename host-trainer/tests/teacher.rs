@@ -52,7 +52,7 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
         ["distil", "--updates", "300", "--batch", "8", "--replay", "3000", "--learning-rate", "0.001"];
     let settings = Command::parse_from(words).settings;
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Distillation::open(settings.clone(), folder.path(), None).unwrap();
+    let mut run = Distillation::open(settings.clone(), folder.path(), None, Vec::new()).unwrap();
     let first = run.advance().unwrap();
     assert!(first < (Action::COUNT as f32).ln() * 1.2, "an untrained policy is near uniform: {first}");
     while run.update() < 200 {
@@ -60,7 +60,7 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
     }
     run.save(folder.path()).unwrap();
     drop(run);
-    let mut run = Distillation::open(settings, folder.path(), None).unwrap();
+    let mut run = Distillation::open(settings, folder.path(), None, Vec::new()).unwrap();
     assert_eq!(run.update(), 200);
     let mut last = 0.0;
     while !run.is_done() {

@@ -4,14 +4,14 @@ use gleaner_host_trainer::evaluation::{Network, realizations, test_preferences};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::observation::normalise;
-use gleaner_policy::{K_MAX, Tokens};
+use gleaner_policy::{K_MAX, LOCAL_MAP_CELLS, Tokens};
 use gleaner_units::ActionMask;
 use gleaner_world::{ScenarioKind, World};
 use rand::{Rng, RngExt};
 use std::sync::Arc;
 
 /// Drawn ones of every size: number i has i mod 13 devices. Numbers reach beyond what flights make, so that the
-/// clips are exercised; heights are whole metres, as everywhere.
+/// clips are exercised; yields come in steps of 64 units, as everywhere.
 pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
     let mut number = |low: f32, high: f32| low + (high - low) * rng.random::<f32>();
     (0..count)
@@ -26,7 +26,7 @@ pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
             Tokens {
                 uav: [number(0.0, 80.0), number(0.0, 80.0), number(-800.0, 800.0), number(-600.0, 600.0)],
                 preference: [w_data, 1.0 - w_data],
-                local_map: (0..100).map(|_| number(0.0, 51.0).floor()).collect(),
+                local_map: (0..LOCAL_MAP_CELLS).map(|_| 64.0 * number(0.0, 256.0).floor()).collect(),
                 devices,
             }
         })

@@ -5,6 +5,7 @@ mod fixture;
 
 use fixture::{Fixture, LOGITS};
 use gleaner_link::{Address, FrameDecoder, Message, Packet, TUNNEL_DECISION};
+use gleaner_policy::LOCAL_MAP_CELLS;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use std::io::{BufRead, BufReader};
@@ -210,7 +211,7 @@ fn every_decision_is_logged_whole() {
     assert_eq!(first["w_data"], 0.25);
     // Spare battery, battery, terminal 2 cells east and 2 north.
     assert_eq!(first["tokens"]["uav"], serde_json::json!([16.0, 20.0, 40.0, 40.0]));
-    assert_eq!(first["tokens"]["local_map"].as_array().unwrap().len(), 100);
+    assert_eq!(first["tokens"]["local_map"].as_array().unwrap().len(), LOCAL_MAP_CELLS);
     assert_eq!(first["tokens"]["devices"], serde_json::json!([[20.0, 20.0, 6000.0, -34.0, 0.0]]));
     assert_eq!(first["slots"], serde_json::json!([0]));
     assert!(first["infer_us"].is_u64() && first["run_s"].is_u64() && first["time_us"].is_u64(), "{first}");

@@ -3,7 +3,7 @@
 use crate::{Decision, Mission, ReturnReason, State};
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Policy, Preference, Situation, Tokens};
-use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Instant};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Instant, Metres, Rays};
 
 /// What a decision starts from.
 #[derive(Clone, Copy)]
@@ -18,6 +18,7 @@ pub(crate) struct Deliberation<'a> {
     pub(crate) state: State,
     pub(crate) cell: Cell,
     pub(crate) battery: BatteryUnits,
+    pub(crate) altitude: Metres,
 }
 
 /// Lets the policy take `decision`: its best action among those that the guard allows. In place, because a decision
@@ -54,13 +55,15 @@ impl Deliberation<'_> {
 
     fn draft(&self, action: Action, mask: ActionMask) -> Decision {
         let spare = self.guard.spare(self.cell, self.battery).unwrap_or_default();
+        let sight = Rays { heights: &self.mission.heights, altitude_m: self.altitude.0 as u16 };
         let situation = Situation {
             cell: self.cell,
             battery: self.battery,
             spare,
             terminal: self.mission.terminal,
             preference: self.preference,
-            heights: &self.mission.heights,
+            altitude: self.altitude,
+            sight: &sight,
         };
         let (tokens, slots) = Tokens::build(&situation, self.devices.iter().copied());
         Decision {

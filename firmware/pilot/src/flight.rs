@@ -268,6 +268,7 @@ impl Machine {
             state,
             cell: flight.leg.cell,
             battery: flight.battery(inputs),
+            altitude: inputs.parameters.altitude(),
         }
     }
 

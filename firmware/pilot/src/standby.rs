@@ -152,6 +152,7 @@ impl Machine {
             state: State::Shadow,
             cell,
             battery,
+            altitude: inputs.parameters.altitude(),
         }
         .open();
         match ask(policy, &mut decision) {

@@ -35,6 +35,7 @@ pub mod schema;
 mod situation;
 mod tokens;
 mod view;
+mod yields;
 
 #[cfg(feature = "std")]
 mod engine;
@@ -46,13 +47,13 @@ pub use engine::{Engine, EngineKind, EngineNameError};
 pub use golden::{GOLDEN_TOLERANCE, Golden, SelfTestError, self_test};
 pub use inference::{Attention, Inference, Policy};
 pub use situation::{DeviceState, Preference, Situation};
-pub use view::View;
 pub use tokens::{Slots, Tokens};
+pub use view::View;
 
 /// The most devices that the model sees at once.
 pub const K_MAX: usize = 12;
 /// Cells along one side of the local map.
-pub const LOCAL_MAP_SIDE: usize = 10;
+pub const LOCAL_MAP_SIDE: usize = 9;
 /// Cells of the local map.
 pub const LOCAL_MAP_CELLS: usize = LOCAL_MAP_SIDE * LOCAL_MAP_SIDE;
 /// Tokens before the first device: aircraft, preference, local map.

@@ -1,6 +1,6 @@
 //! What the aircraft knows when it decides.
 
-use gleaner_units::{BatteryUnits, Cell, Db, HeightMap};
+use gleaner_units::{BatteryUnits, Cell, Db, Metres, Sight};
 use serde::{Deserialize, Serialize};
 
 /// How much data is worth against energy: `w_data` in 0..=1, energy gets the rest (paper, vector w).
@@ -46,7 +46,7 @@ pub struct DeviceState {
 }
 
 /// Everything a decision depends on.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Situation<'a> {
     /// The cell that the aircraft is in.
     pub cell: Cell,
@@ -58,6 +58,8 @@ pub struct Situation<'a> {
     pub terminal: Cell,
     /// The operator's preference.
     pub preference: Preference,
-    /// The city.
-    pub heights: &'a HeightMap,
+    /// Flight altitude above the devices.
+    pub altitude: Metres,
+    /// The city: who is seen from where.
+    pub sight: &'a dyn Sight,
 }

@@ -1,7 +1,8 @@
 //! From a situation to the arrays that enter the model.
 
-use crate::schema::{OUTSIDE_HEIGHT_M, REACHABLE_SNR_DB, SNR_NOT_HEARD_DB};
-use crate::{DeviceState, K_MAX, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE, Situation};
+use crate::schema::{REACHABLE_SNR_DB, SNR_NOT_HEARD_DB};
+use crate::yields::YieldMap;
+use crate::{DeviceState, K_MAX, LOCAL_MAP_CELLS, Situation};
 use gleaner_units::Cell;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,7 @@ pub struct Tokens {
     pub uav: [f32; UAV_FEATURES],
     /// `w_data`, `w_energy`.
     pub preference: [f32; 2],
-    /// Building heights around the aircraft (m), south-west first, row by row.
+    /// What a stay would bring here and around (data units), south-west first, row by row.
     pub local_map: Vec<f32, LOCAL_MAP_CELLS>,
     /// East, north (m), remaining (data units), SNR (dB), reachable: the devices that are present.
     pub devices: Vec<[f32; DEVICE_FEATURES], K_MAX>,
@@ -35,12 +36,13 @@ impl Tokens {
     /// the nearest. Devices keep their order.
     ///
     /// # Cost
-    /// One pass over the devices and one over the local map; no heap.
+    /// For each device that has data left, a ray for each cell where it may be heard (with a table of sight, a look);
+    /// no heap, two kilobytes of stack.
     pub fn build(
         situation: &Situation<'_>,
         devices: impl IntoIterator<Item = DeviceState>,
     ) -> (Tokens, Slots) {
-        let cell_m = situation.heights.grid().cell().0;
+        let cell_m = situation.sight.grid().cell().0;
         let offset_m = |to: Cell| {
             let from = situation.cell;
             [(f32::from(to.x) - f32::from(from.x)) * cell_m, (f32::from(to.y) - f32::from(from.y)) * cell_m]
@@ -49,11 +51,13 @@ impl Tokens {
         let mut tokens = Tokens {
             uav: [situation.spare.0, situation.battery.0, terminal_east_m, terminal_north_m],
             preference: [situation.preference.w_data(), situation.preference.w_energy()],
-            local_map: local_map(situation),
+            local_map: Vec::new(),
             devices: Vec::new(),
         };
         let mut slots = Slots::new();
+        let mut yields = YieldMap::new(situation.sight, situation.cell, situation.altitude);
         for (index, device) in (0..=u16::MAX).zip(devices) {
+            yields.add(&device);
             let [east_m, north_m] = offset_m(device.cell);
             let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
             let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
@@ -71,6 +75,7 @@ impl Tokens {
                 let _ = slots.push(index);
             }
         }
+        tokens.local_map = yields.patches();
         (tokens, slots)
     }
 }
@@ -104,51 +109,37 @@ fn replace_weakest(
     }
 }
 
-fn local_map(situation: &Situation<'_>) -> Vec<f32, LOCAL_MAP_CELLS> {
-    let half = (LOCAL_MAP_SIDE / 2) as i16;
-    let mut map = Vec::new();
-    for north in -half..half {
-        for east in -half..half {
-            let Cell { x, y } = situation.cell;
-            let cell = Cell::new(x.saturating_add(east), y.saturating_add(north));
-            let height_m = situation.heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |height| height.0);
-            let _ = map.push(height_m);
-        }
-    }
-    map
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Preference;
-    use gleaner_units::{BatteryUnits, Db, Grid, HeightMap, Metres};
+    use gleaner_units::{BatteryUnits, Db, Grid, HeightMap, Metres, Rays};
     use proptest::prelude::*;
 
     fn city() -> HeightMap {
-        let mut heights = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
-        heights.set(Cell::new(12, 7), 33);
-        heights
+        HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap())
     }
 
-    fn situation(heights: &HeightMap, x: i16, y: i16) -> Situation<'_> {
+    fn situation<'a>(sight: &'a Rays<'_>, x: i16, y: i16) -> Situation<'a> {
         Situation {
             cell: Cell::new(x, y),
             battery: BatteryUnits(80.0),
             spare: BatteryUnits(48.0),
             terminal: Cell::new(30, 18),
             preference: Preference::new(0.25).unwrap(),
-            heights,
+            altitude: Metres(60.0),
+            sight,
         }
     }
 
     #[test]
     fn offsets_are_metres_east_and_north_and_absence_has_one_meaning() {
         let heights = city();
+        let sight = Rays { heights: &heights, altitude_m: 60 };
         let heard = DeviceState { cell: Cell::new(11, 4), remaining: 6000.0, snr: Some(Db(5.0)) };
         let unheard = DeviceState { snr: None, ..heard };
         let broken = DeviceState { snr: Some(Db(f32::NAN)), remaining: f32::NAN, ..heard };
-        let (tokens, slots) = Tokens::build(&situation(&heights, 10, 6), [heard, unheard, broken]);
+        let (tokens, slots) = Tokens::build(&situation(&sight, 10, 6), [heard, unheard, broken]);
         assert_eq!(tokens.uav, [48.0, 80.0, 400.0, 240.0]);
         assert_eq!(tokens.preference, [0.25, 0.75]);
         assert_eq!(tokens.devices[0], [20.0, -40.0, 6000.0, 5.0, 1.0]);
@@ -158,15 +149,15 @@ mod tests {
     }
 
     #[test]
-    fn the_local_map_reaches_five_cells_south_and_west_and_four_north_and_east() {
+    fn what_is_not_heard_is_in_the_yield_map_all_the_same() {
         let heights = city();
-        let (tokens, _) = Tokens::build(&situation(&heights, 10, 6), []);
+        let sight = Rays { heights: &heights, altitude_m: 60 };
+        let unheard = DeviceState { cell: Cell::new(10, 6), remaining: 6000.0, snr: None };
+        let (tokens, _) = Tokens::build(&situation(&sight, 10, 6), [unheard]);
         assert_eq!(tokens.local_map.len(), LOCAL_MAP_CELLS);
-        assert_eq!(tokens.local_map[(1 + 5) * 10 + (2 + 5)], 33.0);
-        assert_eq!(tokens.local_map.iter().filter(|&&height_m| height_m == 0.0).count(), 99);
-        let (corner, _) = Tokens::build(&situation(&heights, 0, 0), []);
-        assert_eq!(corner.local_map.iter().filter(|&&height_m| height_m == 50.0).count(), 75);
-        assert_eq!(corner.local_map[5 * 10 + 5], 0.0, "the aircraft's own cell");
+        assert_eq!(tokens.local_map[LOCAL_MAP_CELLS / 2], 5952.0, "right here, in steps of 64");
+        let (empty, _) = Tokens::build(&situation(&sight, 10, 6), []);
+        assert_eq!(empty.local_map, [0.0; LOCAL_MAP_CELLS]);
     }
 
     proptest! {
@@ -175,6 +166,7 @@ mod tests {
             snrs in prop::collection::vec(prop::option::of(-30i16..25), 0..40),
         ) {
             let heights = city();
+            let sight = Rays { heights: &heights, altitude_m: 60 };
             let devices: std::vec::Vec<DeviceState> = snrs
                 .iter()
                 .enumerate()
@@ -184,7 +176,7 @@ mod tests {
                     snr: snr.map(|db| Db(f32::from(db))),
                 })
                 .collect();
-            let (tokens, slots) = Tokens::build(&situation(&heights, 10, 6), devices.iter().copied());
+            let (tokens, slots) = Tokens::build(&situation(&sight, 10, 6), devices.iter().copied());
             prop_assert_eq!(tokens.devices.len(), devices.len().min(K_MAX));
             prop_assert!(slots.windows(2).all(|pair| pair[0] < pair[1]), "mission order");
             let key = |device: &DeviceState| {

@@ -7,13 +7,13 @@ use gleaner_policy::onnx::pb::*;
 use gleaner_policy::onnx::{
     INPUTS, InferError, Metadata, ModelCard, ModelError, OUTPUTS, Port, TractPolicy, seal,
 };
-use gleaner_policy::{Golden, K_MAX, Policy, SelfTestError, TOKENS, Tokens};
+use gleaner_policy::{Golden, K_MAX, LOCAL_MAP_CELLS, Policy, SelfTestError, TOKENS, Tokens};
 use proptest::prelude::*;
 use prost::Message;
 use std::sync::LazyLock;
 
 /// Numbers of all inputs together.
-const WIDTH: usize = 4 + 12 * 5 + 12 + 2 + 100;
+const WIDTH: usize = 4 + 12 * 5 + 12 + 2 + LOCAL_MAP_CELLS;
 
 fn weight(action: usize, number: usize) -> f32 {
     ((action * 31 + number * 7) % 19) as f32 / 64.0 - 0.125
@@ -37,7 +37,7 @@ fn tokens() -> Tokens {
     Tokens {
         uav: [48.0, 80.0, 400.0, -240.0],
         preference: [0.25, 0.75],
-        local_map: (0..100).map(|cell| (cell % 50) as f32).collect(),
+        local_map: (0..LOCAL_MAP_CELLS).map(|cell| 64.0 * cell as f32).collect(),
         devices: [[20.0, -40.0, 6000.0, 5.0, 1.0], [60.0, 0.0, 10.0, -34.0, 0.0]].into_iter().collect(),
     }
 }

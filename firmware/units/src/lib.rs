@@ -33,6 +33,7 @@ mod frame;
 mod grid;
 mod heights;
 mod quantity;
+mod sight;
 mod time;
 
 pub use action::{Action, ActionMask};
@@ -42,4 +43,5 @@ pub use frame::{GeoPoint, GridFrame, GridPoint, Ned};
 pub use grid::{Cell, Grid, GridError, MAX_CELLS};
 pub use heights::{CsvError, CsvFault, HeightMap};
 pub use quantity::{BatteryUnits, Db, Dbm, Metres, MetresPerSecond};
+pub use sight::{Rays, Sight};
 pub use time::{Duration, Instant};

@@ -49,6 +49,10 @@ pub struct DistilArguments {
     /// Begin with what the run in this folder has learned.
     #[arg(long)]
     from: Option<PathBuf>,
+    /// Learn what the run in this folder decides, in the mean of the eight views of each situation, instead of what the
+    /// planner plans. Repeatable: the mean of several.
+    #[arg(long, value_name = "FOLDER")]
+    mentor: Vec<PathBuf>,
     #[command(flatten)]
     usual: Arguments,
 }
@@ -103,9 +107,11 @@ fn by_trial<L: Learner>(arguments: &Arguments) -> Result<()> {
 /// Learns from the planner: distillation.
 pub fn distil(arguments: &DistilArguments) -> Result<()> {
     let from = arguments.from.as_deref().map(|folder| learned_of(System::MosacAtt, folder)).transpose()?;
+    let mentors = arguments.mentor.iter().map(|folder| learned_of(System::MosacAtt, folder));
+    let mentors = mentors.collect::<Result<Vec<_>>>()?;
     let arguments = &arguments.usual;
     let mut desk = Desk::open(System::MosacAtt, arguments)?;
-    let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref())?;
+    let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref(), mentors)?;
     desk.begin(run.update())?;
     while !run.is_done() {
         let cross_entropy = run.advance()?;

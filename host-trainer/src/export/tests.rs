@@ -1,5 +1,5 @@
 use super::*;
-use gleaner_policy::Policy;
+use gleaner_policy::{LOCAL_MAP_CELLS, Policy};
 use gleaner_policy::onnx::TractPolicy;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +17,7 @@ fn observation(devices: usize) -> Tokens {
     Tokens {
         uav: [40.0, 72.0, 300.0, -260.0],
         preference: [0.5, 0.5],
-        local_map: (0..100).map(|cell| (cell % 50) as f32).collect(),
+        local_map: (0..LOCAL_MAP_CELLS).map(|cell| 64.0 * cell as f32).collect(),
         devices: (0..devices).map(|n| [20.0 * n as f32, 40.0, 900.0 * n as f32, 12.0, 1.0]).collect(),
     }
 }

@@ -1,7 +1,7 @@
 //! What goes in: samples, and batches packed to the devices that are present.
 
 use super::shape::{DEVICE_FEATURES, DEVICES_MAX, MAP_CELLS, PREFERENCE_FEATURES, UAV_FEATURES};
-use gleaner_policy::View;
+use gleaner_policy::{LOCAL_MAP_SIDE, View};
 
 /// Normalised features of one device.
 pub type DeviceFeatures = [f32; DEVICE_FEATURES];
@@ -13,7 +13,7 @@ pub struct Sample {
     pub uav: [f32; UAV_FEATURES],
     /// Weights of data and of energy.
     pub preference: [f32; PREFERENCE_FEATURES],
-    /// Normalised building heights, south row first.
+    /// Normalised yield map, south row first.
     pub local_map: [f32; MAP_CELLS],
     /// Normalised devices; the first `device_count` are present.
     pub devices: [DeviceFeatures; DEVICES_MAX],
@@ -31,17 +31,16 @@ impl Sample {
     /// The same, turned and mirrored.
     #[must_use]
     pub fn seen(&self, view: View) -> Sample {
-        const SIDE: usize = 9;
         let mut seen = *self;
         seen.uav[2..].copy_from_slice(&view.offset([self.uav[2], self.uav[3]]));
         for device in &mut seen.devices {
             let offset = view.offset([device[0], device[1]]);
             device[..2].copy_from_slice(&offset);
         }
-        for row in 0..SIDE {
-            for column in 0..SIDE {
-                let [to, line] = view.place([column, row], SIDE);
-                seen.local_map[line * SIDE + to] = self.local_map[row * SIDE + column];
+        for row in 0..LOCAL_MAP_SIDE {
+            for column in 0..LOCAL_MAP_SIDE {
+                let [to, line] = view.place([column, row], LOCAL_MAP_SIDE);
+                seen.local_map[line * LOCAL_MAP_SIDE + to] = self.local_map[row * LOCAL_MAP_SIDE + column];
             }
         }
         seen

@@ -23,7 +23,7 @@ pub const DEVICE_FEATURES: usize = 5;
 /// Features of the preference token.
 pub const PREFERENCE_FEATURES: usize = 2;
 /// Cells of the local map.
-pub const MAP_CELLS: usize = 100;
+pub const MAP_CELLS: usize = gleaner_policy::LOCAL_MAP_CELLS;
 /// What the head reads: UAV, preference, map and the pooled devices.
 pub const HEAD_INPUTS: usize = 4 * WIDTH;
 /// Added to the variance in every layer norm.

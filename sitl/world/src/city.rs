@@ -4,7 +4,7 @@ use crate::generator;
 use crate::mirror::Mirror;
 use crate::sight::SightTable;
 use core::fmt::Write;
-use gleaner_units::{Cell, CsvError, Grid, HeightMap, Metres};
+use gleaner_units::{Cell, CsvError, Grid, HeightMap, Metres, Sight};
 use thiserror::Error;
 
 /// Building heights, and which open cell has line of sight to which cell at flight altitude.
@@ -166,6 +166,16 @@ impl City {
             text.push('\n');
         }
         text
+    }
+}
+
+impl Sight for City {
+    fn grid(&self) -> Grid {
+        City::grid(self)
+    }
+
+    fn sees(&self, ground: Cell, air: Cell) -> bool {
+        self.line_of_sight(ground, air)
     }
 }
 

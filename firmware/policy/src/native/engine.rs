@@ -158,7 +158,7 @@ impl Workspace {
         let [first, ..] = &mut self.tokens;
         put(first, 0, project(&network.project_uav, &normalise(&tokens.uav, &UAV)));
         put(first, 1, project(&network.project_preference, &normalise(&tokens.preference, &PREFERENCE)));
-        put(first, 2, project(&network.project_map, &map.map(|height_m| schema::HEIGHT.apply(height_m))));
+        put(first, 2, project(&network.project_map, &map.map(|units| schema::YIELD.apply(units))));
     }
 
     /// One encoder layer: `x = norm(x + attention(x))`, `x = norm(x + ff(x))`, block by block.
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(table("uav"), UAV);
         assert_eq!(table("devices"), DEVICE);
         assert_eq!(table("preference"), PREFERENCE);
-        assert_eq!(table("local_map"), [schema::HEIGHT]);
+        assert_eq!(table("local_map"), [schema::YIELD]);
     }
 
     #[test]
