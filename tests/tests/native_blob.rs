@@ -2,7 +2,7 @@
 
 use gleaner_policy::native::{AlignedBytes, BlobError, Model, NativePolicy, WeightFormat, Workspace};
 use gleaner_policy::onnx::convert;
-use gleaner_policy::{Engine, EngineKind, SelfTestError, schema, self_test};
+use gleaner_policy::{Engine, EngineKind, LOCAL_MAP_CELLS, SelfTestError, schema, self_test};
 use gleaner_tests::programs::repository;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +17,7 @@ const GOLDENS: usize = 60;
 const NAME: usize = 96;
 const HEADER: usize = 144;
 /// Words of a golden pair before the number of devices: aircraft, preference, map.
-const DEVICES: usize = HEADER + 4 * (4 + 2 + 100);
+const DEVICES: usize = HEADER + 4 * (4 + 2 + LOCAL_MAP_CELLS);
 
 fn onnx() -> Vec<u8> {
     std::fs::read(repository().join("models/gleaner.onnx")).expect("the shipped model")

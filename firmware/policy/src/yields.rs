@@ -35,6 +35,8 @@ const UNITS_PER_SLOT: [u16; 64] = [
     206,
 ];
 const TABLE_STEP_M2: f32 = 1200.0;
+/// Where the table ends: nothing is heard from farther away.
+const RANGE_M2: f32 = TABLE_STEP_M2 * (UNITS_PER_SLOT.len() - 1) as f32;
 
 /// Data units per slot at this distance squared: the table, with straight lines between its entries.
 fn units_per_slot(distance_m2: f32) -> f32 {
@@ -70,15 +72,25 @@ impl<'a> YieldMap<'a> {
             return;
         }
         let grid = self.sight.grid();
+        let cell_m2 = grid.cell().0 * grid.cell().0;
+        let square_m2 = |offset: i16, aircraft: i16, device: i16| {
+            let cells = f32::from(offset) + (f32::from(aircraft) - f32::from(device));
+            cells * cells * cell_m2
+        };
         let Cell { x, y } = self.center;
         for (line, north) in self.units.iter_mut().zip(-REACH..) {
+            let row_m2 = square_m2(north, y, device.cell.y) + self.altitude.0 * self.altitude.0;
+            if row_m2 >= RANGE_M2 {
+                continue;
+            }
             for (units, east) in line.iter_mut().zip(-REACH..) {
+                let distance_m2 = row_m2 + square_m2(east, x, device.cell.x);
+                if distance_m2 >= RANGE_M2 {
+                    continue;
+                }
                 let cell = Cell::new(x.saturating_add(east), y.saturating_add(north));
-                let (dx, dy) = (cell.x.abs_diff(device.cell.x), cell.y.abs_diff(device.cell.y));
-                let square = |cells: u16| f32::from(cells) * f32::from(cells) * grid.cell().0 * grid.cell().0;
-                let distance_m2 = square(dx) + square(dy) + self.altitude.0 * self.altitude.0;
-                let stay = SLOTS * units_per_slot(distance_m2);
-                if stay > 0.0 && grid.contains(cell) && self.sight.sees(device.cell, cell) {
+                if grid.contains(cell) && self.sight.sees(device.cell, cell) {
+                    let stay = SLOTS * units_per_slot(distance_m2);
                     // Never more than ten times a table entry.
                     *units = units.saturating_add(stay.min(device.remaining) as u16);
                 }

@@ -240,7 +240,7 @@ impl Layout {
 }
 
 impl Shape {
-    /// The actor: five logits, 91,077 parameters.
+    /// The actor: five logits, 89,861 parameters.
     #[must_use]
     pub const fn actor() -> Self {
         Self { feed_forward: 128, head: 64, outputs: 5 }
@@ -304,7 +304,7 @@ mod tests {
             }
             assert_eq!(next, shape.parameter_count());
         }
-        assert_eq!(Shape::actor().parameter_count(), 91_077);
-        assert_eq!(Shape::critic().parameter_count(), 91_402);
+        assert_eq!(Shape::actor().parameter_count(), 89_861);
+        assert_eq!(Shape::critic().parameter_count(), 90_186);
     }
 }
