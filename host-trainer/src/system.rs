@@ -5,7 +5,7 @@
 //!
 //! | system | network that decides | parameters |
 //! |---|---|---|
-//! | MOSAC-ATT | as drawn in [`crate::net`]; a head of 64 where the text says 128, to stay below the paper's count | 89,861 |
+//! | MOSAC-ATT | as drawn in [`crate::net`]; a head of 64 where the text says 128, to stay below the paper's count, and 81 numbers of a yield map where the paper has 100 of buildings | 89,861 |
 //! | MOSAC-CGL | two branches of two 5 x 5 x 16 convolutions on 10 x 10 and 15 x 11 cells of 4 layers, 336 + 64 numbers, battery, both weights, 256, 256, 5 | 186,565 |
 //! | DDQN-CGL | the same with ten values | 187,850 |
 //! | MOSAC-FTV | 4 + 12 x 5 numbers, both weights, 256, 256, 5 | 84,229 |

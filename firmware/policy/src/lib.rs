@@ -6,7 +6,7 @@
 //! # Glossary
 //! - **situation**: what the aircraft knows when it decides, in the words of `units`.
 //! - **tokens**: the same as arrays of numbers in [`schema`] order: one for the aircraft, one for the preference,
-//!   one for the local map, one per device.
+//!   one for the local map (what a stay would bring, here and around), one per device.
 //! - **preference**: how much data is worth against energy, `(w_data, w_energy)` with sum 1.
 //! - **logits**: one number per action, in contract order; the decision is [`gleaner_units::ActionMask::argmax`].
 //! - **attention**: how much each token looked at each other token in the second layer: the explanation we show.
@@ -52,9 +52,9 @@ pub use view::View;
 
 /// The most devices that the model sees at once.
 pub const K_MAX: usize = 12;
-/// Cells along one side of the local map.
+/// Patches along one side of the local map.
 pub const LOCAL_MAP_SIDE: usize = 9;
-/// Cells of the local map.
+/// Patches of the local map.
 pub const LOCAL_MAP_CELLS: usize = LOCAL_MAP_SIDE * LOCAL_MAP_SIDE;
 /// Tokens before the first device: aircraft, preference, local map.
 pub const FIRST_DEVICE_TOKEN: usize = 3;

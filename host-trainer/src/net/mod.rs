@@ -10,7 +10,7 @@
 //! ```text
 //! uav 4 ───────► 64 ┐
 //! preference 2 ► 64 ├► 2 x encoder layer ─► uav, preference, map ─┐
-//! map 100 ─────► 64 │                       max over devices ─────┴► 256 ► 64 relu ► outputs
+//! map 81 ──────► 64 │                       max over devices ─────┴► 256 ► 64 relu ► outputs
 //! devices n x 5 ► 64 ┘
 //! encoder layer: x = norm(x + out(attention(qkv(x)))); x = norm(x + ff2(relu(ff1(x))))
 //! ```
@@ -28,7 +28,7 @@
 //!
 //! | name | size | |
 //! |---|---|---|
-//! | `project_uav`, `project_preference`, `project_map`, `project_device` `.weight` `.bias` | 64 x 4, 2, 100, 5 | |
+//! | `project_uav`, `project_preference`, `project_map`, `project_device` `.weight` `.bias` | 64 x 4, 2, 81, 5 | |
 //! | `encoder.{0,1}.qkv` `.weight` `.bias` | 192 x 64 | rows 0..64 queries, 64..128 keys, 128..192 values; head h has rows 16 h .. 16 h + 16 of each |
 //! | `encoder.{0,1}.out` `.weight` `.bias` | 64 x 64 | |
 //! | `encoder.{0,1}.norm1`, `.norm2` `.weight` `.bias` | 64 | epsilon 1e-5, biased variance |
