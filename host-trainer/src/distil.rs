@@ -259,9 +259,10 @@ impl Distillation {
 
     /// The mean logits of all mentors in all views; nothing without mentors.
     fn mentored(&self, inputs: &[Sample]) -> Vec<[f32; Action::COUNT]> {
-        let answers = self.mentors.iter().map(|mentor| {
-            Network::new(Shape::actor(), &mentor.actor).averaged_logits(inputs)
-        });
+        let answers = self
+            .mentors
+            .iter()
+            .map(|mentor| Network::new(Shape::actor(), &mentor.actor).averaged_logits(inputs));
         let share = 1.0 / self.mentors.len().max(1) as f32;
         answers
             .reduce(|mut sums, answers| {

@@ -71,8 +71,7 @@ impl Maps {
 
     /// The height of a cell as the network reads it.
     fn height(&self, cell: Cell) -> f32 {
-        let height_m =
-            self.heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
+        let height_m = self.heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
         height_m / HEIGHT_SCALE_M
     }
 

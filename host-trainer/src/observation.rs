@@ -92,3 +92,47 @@ pub fn normalise(tokens: &Tokens) -> Sample {
     sample.preference = tokens.preference;
     sample
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gleaner_policy::{DeviceState, Situation, View};
+    use gleaner_units::{Action, BatteryUnits, Cell, Db, Metres};
+    use gleaner_world::{City, Mirror};
+
+    /// What the builder makes of a mirrored city is the view of what it makes of the city.
+    #[test]
+    fn a_view_is_what_would_be_seen_in_the_mirrored_city() {
+        let city = City::default_city();
+        let grid = city.grid();
+        let open = city.open_cells();
+        for mirror in Mirror::ALL {
+            let mirrored = city.mirrored(mirror);
+            let view = View::ALL.into_iter().find(|view| {
+                Action::ALL.into_iter().all(|action| view.action(action) == mirror.action(action))
+            });
+            let seen = |city: &City, mirror: Mirror, uav: Cell| {
+                let situation = Situation {
+                    cell: mirror.cell(grid, uav),
+                    battery: BatteryUnits(60.0),
+                    spare: BatteryUnits(20.0),
+                    terminal: mirror.cell(grid, Cell::new(30, 18)),
+                    preference: Preference::DATA,
+                    altitude: Metres(60.0),
+                    sight: city,
+                };
+                let devices = (0..6_u8).map(|index| DeviceState {
+                    cell: mirror.cell(grid, open[usize::from(index) * 101]),
+                    remaining: 1000.0 * f32::from(index),
+                    snr: Some(Db(f32::from(index))),
+                });
+                normalise(&Tokens::build(&situation, devices).0)
+            };
+            for uav in [Cell::new(3, 4), Cell::new(20, 15), Cell::new(38, 22)] {
+                let plain = seen(&city, Mirror::default(), uav);
+                assert!(plain.local_map.iter().any(|&units| units > 0.0), "{uav} hears somebody");
+                assert_eq!(seen(&mirrored, mirror, uav), plain.seen(view.unwrap()), "{mirror:?} {uav}");
+            }
+        }
+    }
+}

@@ -9,6 +9,8 @@
 //! leaves the best policy what it is (Ng, Harada and Russell 1999). A slot that loses nothing pays nothing, and a detour
 //! costs what it costs at once. A critic that sees what the policy sees learns how much it goes on to lose, and advantages
 //! look some slots ahead (Schulman et al. 2016).
+//!
+//! Each mission is seen in one of the eight views, turned or mirrored, so that nothing is learned of north alone.
 
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::Network;

@@ -2,13 +2,17 @@
 
 use clap::Parser;
 use gleaner_host_trainer::distil::Distillation;
-use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations};
+use gleaner_host_trainer::evaluation::{Network, evaluate_greedy, realizations};
 use gleaner_host_trainer::flight::Flight;
+use gleaner_host_trainer::learned::Learned;
+use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::teacher::Teacher;
 use gleaner_policy::Preference;
 use gleaner_units::Action;
 use gleaner_world::{ScenarioKind, World};
+use rand::SeedableRng;
 use std::sync::Arc;
 
 /// Mean percent of the data and mean energy over realizations.
@@ -67,4 +71,46 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
         last += run.advance().unwrap() / 100.0;
     }
     assert!(last < 0.75 * first, "cross entropy {first} before, {last} after 300 updates");
+}
+
+/// A pupil that begins as its own mentor: the views of an untrained network disagree, those of the pupil less.
+#[test]
+fn a_pupil_of_its_own_views_is_of_one_mind() {
+    let words =
+        ["distil", "--updates", "300", "--batch", "8", "--replay", "3000", "--learning-rate", "0.001"];
+    let settings = Command::parse_from(words).settings;
+    let mentor = Learned {
+        system: System::MosacAtt,
+        method: "train".into(),
+        settings: settings.clone(),
+        actor: Shape::actor().initialise(&mut rand_chacha::ChaCha8Rng::seed_from_u64(3)),
+        update: 1,
+        steps: 1,
+        score: 0.0,
+    };
+    let world = Arc::new(World::default_world());
+    let flights = realizations(&world, &ScenarioKind::ReachDestination.scenario(), 30).unwrap();
+    let flights = flights
+        .iter()
+        .map(|(seed, realization)| Flight::new(&world, realization, *seed, Preference::DATA).unwrap());
+    let samples: Vec<_> = flights.map(|flight| flight.observe().with(flight.preference())).collect();
+    let discord = |actor: &[f32]| {
+        let mut network = Network::new(Shape::actor(), actor);
+        let means = network.averaged_logits(&samples);
+        let plain = network.logits(samples.iter().copied());
+        let squares = plain.as_flattened().iter().zip(means.as_flattened()).map(|(a, b)| (a - b) * (a - b));
+        squares.sum::<f32>()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let mut best = None;
+    let mentors = vec![mentor.clone()];
+    let mut run = Distillation::open(settings, folder.path(), Some(&mentor), mentors).unwrap();
+    while !run.is_done() {
+        assert!(run.advance().unwrap().is_finite());
+    }
+    run.validate(&mut best).unwrap();
+    let pupil = best.unwrap();
+    assert!(pupil.method.ends_with("distil --from FIRST --mentor FIRST"), "{}", pupil.method);
+    let (before, after) = (discord(&mentor.actor), discord(&pupil.actor));
+    assert!(after < 0.5 * before, "{before} before, {after} after");
 }

@@ -1,6 +1,6 @@
 use super::*;
-use gleaner_policy::{LOCAL_MAP_CELLS, Policy};
 use gleaner_policy::onnx::TractPolicy;
+use gleaner_policy::{LOCAL_MAP_CELLS, Policy};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::HashSet;

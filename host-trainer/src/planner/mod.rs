@@ -22,6 +22,8 @@ use rand_chacha::ChaCha8Rng;
 pub const THRIFT: f32 = 0.98;
 /// The search from scratch, when a mission begins.
 const BEGIN: Effort = Effort { tours: 6_000, temperatures: [1.0, 0.1] };
+/// Below this weight of data hardly a detour pays, and little search finds the shortest way.
+const DETOURS: f32 = 0.15;
 /// The search at every slot, from the tour of the slot before.
 const REFINE: Effort = Effort { tours: 250, temperatures: [0.5, 0.05] };
 
@@ -53,7 +55,10 @@ impl Prospect {
         let w_data = flight.preference().w_data().min(THRIFT);
         let problem = Problem { known: &self.known, state: &state, w_data };
         let (value, tour) = match self.tour.take() {
-            None => problem.anneal(Tour::default(), if w_data < 0.15 { REFINE } else { BEGIN }, &mut self.rng),
+            None => {
+                let effort = if w_data < DETOURS { REFINE } else { BEGIN };
+                problem.anneal(Tour::default(), effort, &mut self.rng)
+            }
             Some(mut tour) => {
                 // A slot of the dwell is over.
                 if self.cell == Some(state.cell)
