@@ -146,7 +146,13 @@ fn the_order_of_the_devices_means_nothing() {
             }
             let mut apart = Apart::default();
             apart.add(&a, &b, ActionMask::FULL);
-            assert!(apart.logits < 2e-5 && apart.attention < 2e-5, "{order:?}: {apart:?}");
+            // Sums of another order, through all layers. Drawn maps are bright everywhere, so the numbers inside are
+            // larger than the logits.
+            let largest = a.logits.iter().fold(1.0_f32, |largest, logit| largest.max(logit.abs()));
+            assert!(
+                apart.logits < 4e-6 * largest && apart.attention < 2e-5,
+                "{order:?}: {apart:?}, largest logit {largest}"
+            );
         }
     });
 }
