@@ -329,18 +329,16 @@ impl Distillation {
     /// # Errors
     /// The network's answer is not a number.
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<crate::train::Tables, TrainError> {
-        let tables = self.validation.judge(&self.world, &self.kept.averaged)?;
-        Learned {
+        let candidate = Learned {
             system: System::MosacAtt,
             method: self.method.clone(),
             settings: self.settings.clone(),
             actor: self.kept.averaged.clone(),
             update: self.kept.update,
             steps: self.kept.steps,
-            score: tables.score(),
-        }
-        .offer(best);
-        Ok(tables)
+            score: f64::NEG_INFINITY,
+        };
+        Ok(self.validation.examine(&self.world, candidate, best)?)
     }
 
     /// Writes the checkpoint.

@@ -6,17 +6,18 @@ use gleaner_policy::{LOCAL_MAP_CELLS, Preference, Tokens};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// The steps in which yields enter the model, data units.
-const STEP_UNITS: f32 = 64.0;
-
 /// What the replay memory keeps of a state: everything but the preference, small enough to keep 100,000 of
 /// them. Normalised, except for the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     uav: [f32; 4],
-    /// Yields in steps of [`STEP_UNITS`], as the builder makes them.
+    /// Yields in steps of [`schema::YIELD_STEP_UNITS`], as the builder makes them.
     local_map: Vec<u8>,
     devices: Vec<DeviceFeatures>,
+}
+
+fn step_units() -> f32 {
+    f32::from(schema::YIELD_STEP_UNITS)
 }
 
 struct Normalisations {
@@ -56,7 +57,7 @@ impl Observation {
                 normal
             })
             .collect();
-        let local_map = tokens.local_map.iter().map(|&units| (units / STEP_UNITS) as u8).collect();
+        let local_map = tokens.local_map.iter().map(|&units| (units / step_units()) as u8).collect();
         Observation { uav, local_map, devices }
     }
 
@@ -78,7 +79,7 @@ impl Observation {
         let yields = NORMALISATIONS.yields;
         debug_assert_eq!(self.local_map.len(), LOCAL_MAP_CELLS);
         for (normal, &steps) in sample.local_map.iter_mut().zip(&self.local_map) {
-            *normal = yields.apply(f32::from(steps) * STEP_UNITS);
+            *normal = yields.apply(f32::from(steps) * step_units());
         }
         sample.devices[..self.devices.len()].copy_from_slice(&self.devices);
         sample

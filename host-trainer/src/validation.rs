@@ -1,6 +1,7 @@
 //! The realizations that choose the best parameters of a run.
 
 use crate::evaluation::{Decider, DeciderError, Network, Table, evaluate};
+use crate::learned::Learned;
 use crate::net::Shape;
 use crate::settings::Settings;
 use gleaner_world::{Realization, ScenarioError, ScenarioKind, Seed, World};
@@ -81,5 +82,20 @@ impl Validation {
     /// The network's answer is not a number: the run diverged.
     pub fn judge(&self, world: &Arc<World>, actor: &[f32]) -> Result<Tables, DeciderError> {
         self.tables(world, &mut Network::new(Shape::actor(), actor))
+    }
+
+    /// Judges a MOSAC-ATT policy, gives it its score and offers it to `best`.
+    ///
+    /// # Errors
+    /// Those of [`Validation::judge`].
+    pub fn examine(
+        &self,
+        world: &Arc<World>,
+        candidate: Learned,
+        best: &mut Option<Learned>,
+    ) -> Result<Tables, DeciderError> {
+        let tables = self.judge(world, &candidate.actor)?;
+        Learned { score: tables.score(), ..candidate }.offer(best);
+        Ok(tables)
     }
 }

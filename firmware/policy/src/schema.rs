@@ -68,6 +68,8 @@ pub const YIELD: Normalisation = Normalisation::scale(6400.0);
 
 /// The SNR that stands for "not heard": normalised, the lower clip.
 pub const SNR_NOT_HEARD_DB: f32 = -34.0;
+/// Yields come in steps of so many data units, at most 255 of them: a byte each in the trainer's memory.
+pub const YIELD_STEP_UNITS: u16 = 64;
 /// SNR from which on a device's data flows (paper, Sigma), so that it counts as reachable.
 pub const REACHABLE_SNR_DB: f32 = 5.0;
 

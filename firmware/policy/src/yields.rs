@@ -8,6 +8,7 @@
 //! The network sees [`LOCAL_MAP_SIDE`] by [`LOCAL_MAP_SIDE`] numbers, fine near the aircraft and coarse far away: per
 //! axis the bands -15..-8, -7..-4, -3..-2, -1, 0, 1, 2..3, 4..7, 8..15, and of each patch its best cell.
 
+use crate::schema::YIELD_STEP_UNITS;
 use crate::{DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
 use gleaner_units::{Cell, Metres, Sight};
 use heapless::Vec;
@@ -20,8 +21,6 @@ const BANDS: [(i16, i16); LOCAL_MAP_SIDE] =
     [(-15, -8), (-7, -4), (-3, -2), (-1, -1), (0, 0), (1, 1), (2, 3), (4, 7), (8, 15)];
 /// The stay that a yield is of, slots.
 const SLOTS: f32 = 10.0;
-/// Yields come in steps of so many data units, as many as fit a byte.
-pub(crate) const STEP_UNITS: u16 = 64;
 const STEPS_MAX: u16 = 255;
 
 /// Data units that a slot carries with line of sight, by the square of the distance in space, one entry every
@@ -106,8 +105,8 @@ impl<'a> YieldMap<'a> {
             for east in BANDS {
                 let lines = self.units.get(band(north)).into_iter().flatten();
                 let best = lines.flat_map(|line| line.get(band(east)).into_iter().flatten()).max();
-                let steps = (best.copied().unwrap_or(0) / STEP_UNITS).min(STEPS_MAX);
-                let _ = patches.push(f32::from(steps * STEP_UNITS));
+                let steps = (best.copied().unwrap_or(0) / YIELD_STEP_UNITS).min(STEPS_MAX);
+                let _ = patches.push(f32::from(steps * YIELD_STEP_UNITS));
             }
         }
         patches

@@ -36,7 +36,7 @@ pub struct Arguments {
     /// one.
     #[arg(long)]
     cities: Option<u64>,
-    /// The oracle too, with so many tours for each search; 100,000 take about a second per mission.
+    /// The oracle too, with so many tours for each search; 20,000 take less than a second per mission.
     #[arg(long, value_name = "TOURS")]
     oracle: Option<u32>,
     /// One JSON object instead of tables.
