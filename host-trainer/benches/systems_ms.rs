@@ -5,7 +5,7 @@
 mod processor;
 
 use clap::Parser;
-use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::train::Run;
 use processor::cpu_ms;
@@ -46,6 +46,7 @@ fn measure<L: Learner>() {
 }
 
 fn main() {
+    measure::<Gleaner>();
     measure::<MosacAtt>();
     measure::<MosacCgl>();
     measure::<DdqnCgl>();

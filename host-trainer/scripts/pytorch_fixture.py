@@ -47,17 +47,17 @@ class Generator:
 class Network(nn.Module):
     """The sections of the flat vector are the modules in the order of `flat_order`."""
 
-    def __init__(self, outputs):
+    def __init__(self, cells, features, head, outputs):
         super().__init__()
         self.project_uav = nn.Linear(4, 64)
         self.project_preference = nn.Linear(2, 64)
-        self.project_map = nn.Linear(81, 64)
-        self.project_device = nn.Linear(5, 64)
+        self.project_map = nn.Linear(cells, 64)
+        self.project_device = nn.Linear(features, 64)
         self.encoder = nn.ModuleList(
             nn.TransformerEncoderLayer(64, 4, 128, dropout=0.0, batch_first=True, norm_first=False)
             for _ in range(2)
         )
-        self.head = nn.ModuleList([nn.Linear(256, 64), nn.Linear(64, outputs)])
+        self.head = nn.ModuleList([nn.Linear(256, head), nn.Linear(head, outputs)])
 
     def flat_order(self):
         """(parameter, inputs of its linear layer, or None for a norm) in the order of the flat vector."""
@@ -112,17 +112,17 @@ class Network(nn.Module):
         return self.head[1](torch.relu(self.head[0](joined))), attention
 
 
-def freeze(outputs):
+def freeze(cells, features, head, outputs):
     """Sections of one network, in the order in which they are stored."""
     generator = Generator(SEED)
-    network = Network(outputs)
+    network = Network(cells, features, head, outputs)
     network.draw(generator)
     count = len(DEVICE_COUNTS)
-    uav, preference, local_map = generator.tensor(count, 4), generator.tensor(count, 2), generator.tensor(count, 81)
-    devices = torch.zeros(count, DEVICES_MAX, 5)
+    uav, preference, local_map = generator.tensor(count, 4), generator.tensor(count, 2), generator.tensor(count, cells)
+    devices = torch.zeros(count, DEVICES_MAX, features)
     absent = torch.ones(count, DEVICES_MAX, dtype=torch.bool)
     for sample, present in enumerate(DEVICE_COUNTS):
-        devices[sample, :present] = generator.tensor(present, 5)
+        devices[sample, :present] = generator.tensor(present, features)
         absent[sample, :present] = False
     targets = generator.tensor(count, outputs)
 
@@ -156,8 +156,9 @@ def main():
     torch.set_num_threads(1)
     folder = pathlib.Path(__file__).parent.parent / "tests" / "fixtures"
     numbers, sections = [], {}
-    for name, outputs in [("actor", 5), ("critic", 10)]:
-        for section, tensor in freeze(outputs).items():
+    # Numbers of the map, numbers of a device, width of the head, outputs.
+    for name, sizes in [("actor", (81, 7, 64, 5)), ("critic", (81, 7, 64, 10)), ("paper", (100, 5, 128, 5))]:
+        for section, tensor in freeze(*sizes).items():
             sections[f"{name}.{section}"] = [sum(len(n) for n in numbers), tensor.numel()]
             numbers.append(tensor.flatten())
     torch.cat(numbers).numpy().astype("<f4").tofile(folder / "pytorch.f32")

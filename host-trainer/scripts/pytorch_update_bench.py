@@ -37,7 +37,7 @@ class Network(nn.Module):
     def __init__(self, outputs):
         super().__init__()
         self.uav, self.preference = nn.Linear(4, 64), nn.Linear(2, 64)
-        self.map, self.device = nn.Linear(81, 64), nn.Linear(5, 64)
+        self.map, self.device = nn.Linear(81, 64), nn.Linear(7, 64)
         self.encoder = nn.Sequential(Layer(), Layer())
         self.head = nn.Sequential(nn.Linear(256, 64), nn.ReLU(), nn.Linear(64, outputs))
 
@@ -49,7 +49,7 @@ class Network(nn.Module):
 
 
 def batch():
-    sizes = [(SAMPLES, 4), (SAMPLES, 2), (SAMPLES, 81), (SAMPLES, DEVICES, 5)]
+    sizes = [(SAMPLES, 4), (SAMPLES, 2), (SAMPLES, 81), (SAMPLES, DEVICES, 7)]
     return [torch.rand(*size) for size in sizes]
 
 

@@ -91,19 +91,7 @@ impl Named {
     /// # Errors
     /// It is of another type or version.
     pub fn value<T: DeserializeOwned>(&self) -> Result<T, CheckpointError> {
-        self.decode(self.value_at)
-    }
-
-    /// What a file from before there were names holds: the first string in it is no name but part of the value.
-    ///
-    /// # Errors
-    /// Those of [`Named::value`].
-    pub fn unnamed<T: DeserializeOwned>(&self) -> Result<T, CheckpointError> {
-        self.decode(0)
-    }
-
-    fn decode<T: DeserializeOwned>(&self, from: usize) -> Result<T, CheckpointError> {
-        match postcard::take_from_bytes(&self.payload[from..]) {
+        match postcard::take_from_bytes(&self.payload[self.value_at..]) {
             Ok((value, [])) => Ok(value),
             Ok(_) | Err(_) => Err(CheckpointError::Format { path: self.path.clone() }),
         }
@@ -175,7 +163,6 @@ mod tests {
         let named = load_named(&path).unwrap();
         assert_eq!(named.name(), "mosac-cgl");
         assert_eq!(named.value::<(u32, f32)>().unwrap(), (7, 0.5));
-        assert_eq!(named.unnamed::<(String, u32, f32)>().unwrap().1, 7);
         assert!(matches!(named.value::<u32>(), Err(CheckpointError::Format { .. })), "four bytes left over");
         save(&path, &u64::MAX).unwrap();
         assert!(matches!(load_named(&path), Err(CheckpointError::Format { .. })));

@@ -61,7 +61,7 @@ impl<E: Encoding> learner::Learner for Learner<E> {
     }
 
     fn network() -> E::Network {
-        E::Network::with_outputs(VALUES)
+        E::network(VALUES)
     }
 
     fn deciding(&self) -> &[f32] {

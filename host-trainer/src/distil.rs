@@ -330,7 +330,7 @@ impl Distillation {
     /// The network's answer is not a number.
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<crate::train::Tables, TrainError> {
         let candidate = Learned {
-            system: System::MosacAtt,
+            system: System::Gleaner,
             method: self.method.clone(),
             settings: self.settings.clone(),
             actor: self.kept.averaged.clone(),

@@ -1,7 +1,9 @@
 //! How a system sees a flight: what it remembers of a state, and how it shows that to its network.
 
 use crate::flight::Flight;
-use crate::net::{Architecture, Batch, Shape, VECTOR_FEATURES, VectorBatch, VectorShape};
+use crate::net::{
+    Architecture, Batch, Shape, VECTOR_DEVICE_FEATURES, VECTOR_FEATURES, VectorBatch, VectorShape,
+};
 use crate::observation::Observation;
 use crate::system::System;
 use gleaner_policy::{Preference, schema};
@@ -18,6 +20,11 @@ pub trait Encoding: Debug {
     type Network: Architecture;
     /// The system that soft actor-critic and this encoding make.
     const MOSAC: System;
+
+    /// The network with so many outputs.
+    fn network(outputs: usize) -> Self::Network {
+        Self::Network::with_outputs(outputs)
+    }
 
     /// The encoding of flights in this world.
     fn of(world: &World) -> Self;
@@ -49,7 +56,7 @@ pub struct Attention;
 impl Encoding for Attention {
     type Observation = Observation;
     type Network = Shape;
-    const MOSAC: System = System::MosacAtt;
+    const MOSAC: System = System::Gleaner;
 
     fn of(_: &World) -> Attention {
         Attention
@@ -92,7 +99,8 @@ impl Encoding for FeatureVector {
 
     fn observe(&self, flight: &Flight) -> Features {
         let sample = flight.observe().with(flight.preference());
-        Features([&sample.uav[..], sample.devices_present().as_flattened()].concat())
+        let devices = sample.devices_present().iter().flat_map(|device| &device[..VECTOR_DEVICE_FEATURES]);
+        Features(sample.uav.iter().chain(devices).copied().collect())
     }
 
     fn push(&self, seen: &Features, preferences: &[Preference], batch: &mut VectorBatch) {
@@ -110,7 +118,7 @@ impl Encoding for FeatureVector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::learner::{Asked, Learner, MosacAtt, MosacCgl, MosacFtv};
+    use crate::learner::{Asked, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
     use gleaner_units::Action;
     use gleaner_world::{Realization, Scenario, Seed};
     use rand::SeedableRng;
@@ -133,7 +141,9 @@ mod tests {
             assert_eq!(numbers.len(), 4 + 5 * devices);
             let tokens = crate::observation::normalise(&flight.tokens());
             assert_eq!(numbers[..4], tokens.uav);
-            assert_eq!(numbers[4..], *tokens.devices_present().as_flattened());
+            for (place, device) in numbers[4..].chunks(5).zip(tokens.devices_present()) {
+                assert_eq!(place, &device[..5]);
+            }
         }
     }
 
@@ -154,6 +164,7 @@ mod tests {
 
     #[test]
     fn every_encoding_sees_the_way_home_and_the_preference() {
+        sees::<Gleaner>();
         sees::<MosacAtt>();
         sees::<MosacCgl>();
         sees::<MosacFtv>();

@@ -4,7 +4,7 @@ use crate::checkpoint::{self, CheckpointError};
 use crate::encoding::Encoding;
 use crate::evaluation::{Decider, DeciderError, Network};
 use crate::flight::Flight;
-use crate::learner::{Asked, DdqnCgl, Learner, MosacCgl, MosacFtv};
+use crate::learner::{Asked, DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
 use crate::net::Shape;
 use crate::settings::{Settings, as_json};
 use crate::system::System;
@@ -20,8 +20,7 @@ pub const LEARNED: &str = "learned.checkpoint";
 
 /// The best parameters of a run by validation, and how they came about: what `evaluate` and `export` read.
 ///
-/// In the file the system's name stands before everything else. Files that begin with a method instead are older than
-/// the systems: they hold MOSAC-ATT.
+/// In the file the system's name stands before everything else.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Learned {
     /// Whose parameters they are.
@@ -48,6 +47,12 @@ pub enum LearnedError {
     /// The file.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// It does not say whose parameters it holds.
+    #[error("{}: holds no system of this version; train it anew", path.display())]
+    UnknownSystem {
+        /// The file.
+        path: PathBuf,
+    },
     /// Parameters of a network with other shapes.
     #[error(
         "{}: {found} parameters, and {system} has {expected} in this version; train it anew",
@@ -86,11 +91,9 @@ impl Learned {
             return Ok(None);
         }
         let named = checkpoint::load_named(&path)?;
-        let learned = match named.name().parse() {
-            Ok(system) => Learned { system, ..named.value()? },
-            Err(_) => named.unnamed()?,
-        };
-        let (system, found) = (learned.system, learned.actor.len());
+        let Ok(system) = named.name().parse() else { return Err(LearnedError::UnknownSystem { path }) };
+        let learned = Learned { system, ..named.value()? };
+        let found = learned.actor.len();
         let expected = system.parameter_count();
         if found == expected {
             Ok(Some(learned))
@@ -132,7 +135,8 @@ impl Learned {
     pub fn decider(&self) -> Box<dyn Decider + '_> {
         match self.system {
             // The same numbers, and it tells its attention.
-            System::MosacAtt => Box::new(Network::new(Shape::actor(), &self.actor)),
+            System::Gleaner => Box::new(Network::new(Shape::actor(), &self.actor)),
+            System::MosacAtt => Box::new(Trained::<MosacAtt>::new(&self.actor)),
             System::MosacCgl => Box::new(Trained::<MosacCgl>::new(&self.actor)),
             System::DdqnCgl => Box::new(Trained::<DdqnCgl>::new(&self.actor)),
             System::MosacFtv => Box::new(Trained::<MosacFtv>::new(&self.actor)),
@@ -219,11 +223,11 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_a_system_is_mosac_att() {
+    fn a_file_without_a_system_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        checkpoint::save(&folder.path().join(LEARNED), &learned(System::MosacAtt)).unwrap();
-        let back = Learned::load(folder.path()).unwrap().unwrap();
-        assert_eq!((back.system, back.method.as_str(), back.update), (System::MosacAtt, "train", 7));
+        checkpoint::save(&folder.path().join(LEARNED), &learned(System::Gleaner)).unwrap();
+        let error = Learned::load(folder.path()).unwrap_err();
+        assert!(matches!(error, LearnedError::UnknownSystem { .. }), "{error}");
     }
 
     #[test]

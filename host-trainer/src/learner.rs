@@ -5,6 +5,7 @@ use crate::encoding::{Attention, BatchOf, Encoding, FeatureVector, WorkspaceOf};
 use crate::maps::Maps;
 use crate::mosac::{self, Distribution};
 use crate::net::{Adam, Architecture, Samples};
+use crate::paper_tokens::PaperTokens;
 use crate::replay::Transition;
 use crate::settings::Settings;
 use crate::system::System;
@@ -15,8 +16,10 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Debug, Display};
 
-/// Soft actor-critic with attention: the policy that flies.
-pub type MosacAtt = mosac::Learner<Attention>;
+/// Soft actor-critic with attention on what the policy that flies sees.
+pub type Gleaner = mosac::Learner<Attention>;
+/// Soft actor-critic with attention on what the paper's policy sees.
+pub type MosacAtt = mosac::Learner<PaperTokens>;
 /// Soft actor-critic on centred maps.
 pub type MosacCgl = mosac::Learner<Maps>;
 /// Soft actor-critic on a feature vector.

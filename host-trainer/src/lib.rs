@@ -38,6 +38,7 @@ pub mod net;
 pub mod observation;
 pub mod oracle;
 pub mod paper;
+pub mod paper_tokens;
 pub mod pareto;
 pub mod parts;
 pub mod planner;

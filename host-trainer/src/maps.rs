@@ -47,6 +47,12 @@ pub struct Scene {
     devices: Vec<(Cell, f32)>,
 }
 
+/// The height of a cell as the paper's networks read it.
+pub(crate) fn height(heights: &HeightMap, cell: Cell) -> f32 {
+    let height_m = heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
+    height_m / HEIGHT_SCALE_M
+}
+
 /// Paints scenes of one city.
 #[derive(Clone, Debug)]
 pub struct Maps {
@@ -69,12 +75,6 @@ impl Maps {
         Maps { heights: heights.clone(), sums_m }
     }
 
-    /// The height of a cell as the network reads it.
-    fn height(&self, cell: Cell) -> f32 {
-        let height_m = self.heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
-        height_m / HEIGHT_SCALE_M
-    }
-
     /// The mean height of a window as the network reads it.
     fn mean_height(&self, south_west: Cell) -> f32 {
         let grid = self.heights.grid();
@@ -92,8 +92,7 @@ impl Maps {
 
     fn paint_heights(&self, uav: Cell, local: &mut [f32; LOCAL_NUMBERS], global: &mut [f32; GLOBAL_NUMBERS]) {
         for (index, cell) in local.chunks_exact_mut(MAP_CHANNELS).enumerate() {
-            let (east, north) = ((index % LOCAL_SIDE) as i16, (index / LOCAL_SIDE) as i16);
-            cell[HEIGHTS] = self.height(Cell::new(uav.x + east - LOCAL_REACH, uav.y + north - LOCAL_REACH));
+            cell[HEIGHTS] = height(&self.heights, local_cell(uav, index));
         }
         let (west, south) =
             (uav.x - WINDOW / 2 - GLOBAL_MIDDLE.0 * WINDOW, uav.y - WINDOW / 2 - GLOBAL_MIDDLE.1 * WINDOW);
@@ -102,6 +101,12 @@ impl Maps {
             cell[HEIGHTS] = self.mean_height(Cell::new(west + east * WINDOW, south + north * WINDOW));
         }
     }
+}
+
+/// The cell at this place of the local map around the aircraft, south-west first, row by row.
+pub(crate) fn local_cell(uav: Cell, index: usize) -> Cell {
+    let (east, north) = ((index % LOCAL_SIDE) as i16, (index / LOCAL_SIDE) as i16);
+    Cell::new(uav.x + east - LOCAL_REACH, uav.y + north - LOCAL_REACH)
 }
 
 /// Adds a mark to the cell and to the window in which it lies, where the maps show them.

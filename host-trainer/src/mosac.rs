@@ -128,11 +128,11 @@ impl<E: Encoding> learner::Learner for Learner<E> {
 }
 
 fn actor<E: Encoding>() -> E::Network {
-    E::Network::with_outputs(ACTIONS)
+    E::network(ACTIONS)
 }
 
 fn critic<E: Encoding>() -> E::Network {
-    E::Network::with_outputs(VALUES)
+    E::network(VALUES)
 }
 
 impl<E: Encoding> Learner<E> {

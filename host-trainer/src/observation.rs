@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 pub struct Observation {
     uav: [f32; 4],
     /// Yields in steps of [`schema::YIELD_STEP_UNITS`], as the builder makes them.
-    local_map: Vec<u8>,
+    local_map: Vec<i16>,
     devices: Vec<DeviceFeatures>,
 }
 
@@ -22,13 +22,13 @@ fn step_units() -> f32 {
 
 struct Normalisations {
     uav: [Normalisation; 4],
-    device: [Normalisation; 5],
+    device: [Normalisation; 7],
     yields: Normalisation,
 }
 
 static NORMALISATIONS: LazyLock<Normalisations> = LazyLock::new(|| {
     let of = |tensor: &str| schema::normalisations(tensor).collect::<Vec<_>>();
-    let matches = "the schema has 4 numbers for the aircraft and 5 for a device";
+    let matches = "the schema has 4 numbers for the aircraft and 7 for a device";
     Normalisations {
         uav: of("uav").try_into().expect(matches),
         device: of("devices").try_into().expect(matches),
@@ -50,14 +50,14 @@ impl Observation {
             .devices
             .iter()
             .map(|device| {
-                let mut normal = [0.0; 5];
+                let mut normal = [0.0; 7];
                 for (normal, pair) in normal.iter_mut().zip(device.iter().zip(&scales.device)) {
                     *normal = apply(pair);
                 }
                 normal
             })
             .collect();
-        let local_map = tokens.local_map.iter().map(|&units| (units / step_units()) as u8).collect();
+        let local_map = tokens.local_map.iter().map(|&units| (units / step_units()) as i16).collect();
         Observation { uav, local_map, devices }
     }
 

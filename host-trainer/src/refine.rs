@@ -59,7 +59,7 @@ const CRITIC_FIRST: u64 = 25;
 const PREFERENCE_BINS: usize = 11;
 const SPREAD_MIN: f32 = 0.3;
 /// Advantages beyond this many deviations count as this much: one lost mission must not turn the policy over.
-const ADVANTAGE_MAX: f32 = 4.0;
+const ADVANTAGE_MAX: f32 = 8.0;
 /// The longest gradient that is followed.
 const GRADIENT_MAX: f32 = 0.5;
 /// Share of the actor that its running average takes over per update.
@@ -375,7 +375,7 @@ impl Refinement {
     /// The network's answer is not a number.
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let candidate = Learned {
-            system: System::MosacAtt,
+            system: System::Gleaner,
             method: self.method.clone(),
             settings: self.settings.clone(),
             actor: self.kept.averaged.clone(),

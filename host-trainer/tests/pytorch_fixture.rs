@@ -81,18 +81,18 @@ impl Generator {
         parameters
     }
 
-    fn batch(&mut self, device_counts: &[usize]) -> Batch {
+    fn batch<const MAP: usize, const DEVICE: usize>(&mut self, device_counts: &[usize]) -> Batch {
         let count = device_counts.len();
         let (uav, preference, local_map) =
-            (self.numbers(count * 4), self.numbers(count * 2), self.numbers(count * MAP_CELLS));
+            (self.numbers(count * 4), self.numbers(count * 2), self.numbers(count * MAP));
         let mut batch = Batch::new();
         for (sample, &present) in device_counts.iter().enumerate() {
-            let devices = self.numbers(present * DEVICE_FEATURES);
+            let devices = self.numbers(present * DEVICE);
             batch.push(
                 uav[sample * 4..][..4].try_into().unwrap(),
                 preference[sample * 2..][..2].try_into().unwrap(),
-                local_map[sample * MAP_CELLS..][..MAP_CELLS].try_into().unwrap(),
-                devices.as_chunks().0,
+                local_map[sample * MAP..].first_chunk::<MAP>().unwrap(),
+                devices.as_chunks::<DEVICE>().0,
             );
         }
         batch
@@ -113,12 +113,12 @@ fn key_biases(shape: Shape) -> Vec<Range<usize>> {
     tensors.map(|tensor| tensor.offset + 64..tensor.offset + 128).collect()
 }
 
-fn agrees_with_pytorch(network: &str, shape: Shape) {
+fn agrees_with_pytorch<const MAP: usize, const DEVICE: usize>(network: &str, shape: Shape) {
     let fixture = Fixture::read("pytorch");
     let manifest = &fixture.manifest;
     let mut generator = Generator(manifest.seed.parse().unwrap());
     let mut parameters = generator.parameters(shape);
-    let batch = generator.batch(&manifest.device_counts);
+    let batch = generator.batch::<MAP, DEVICE>(&manifest.device_counts);
     let targets = generator.numbers(batch.len() * shape.outputs);
     let strided = |all: &[f32]| all.iter().copied().step_by(manifest.stride).collect::<Vec<_>>();
 
@@ -160,12 +160,17 @@ fn agrees_with_pytorch(network: &str, shape: Shape) {
 
 #[test]
 fn actor_agrees_with_pytorch() {
-    agrees_with_pytorch("actor", Shape::actor());
+    agrees_with_pytorch::<MAP_CELLS, DEVICE_FEATURES>("actor", Shape::actor());
 }
 
 #[test]
 fn critic_agrees_with_pytorch() {
-    agrees_with_pytorch("critic", Shape::critic());
+    agrees_with_pytorch::<MAP_CELLS, DEVICE_FEATURES>("critic", Shape::critic());
+}
+
+#[test]
+fn the_paper_s_actor_agrees_with_pytorch() {
+    agrees_with_pytorch::<100, 5>("paper", Shape::paper(5));
 }
 
 /// `draw` packs the states; the preferences and the targets are drawn after them.

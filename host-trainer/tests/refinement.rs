@@ -27,7 +27,7 @@ fn settings(more: &[&str]) -> Settings {
 
 fn untrained() -> Learned {
     Learned {
-        system: System::MosacAtt,
+        system: System::Gleaner,
         method: "train".into(),
         settings: settings(&[]),
         actor: Shape::actor().initialise(&mut ChaCha8Rng::seed_from_u64(3)),

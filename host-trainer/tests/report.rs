@@ -20,7 +20,7 @@ struct Defaults {
 /// A run that has learned nothing, and whose curve has one point.
 fn run_folder(folder: &Path) {
     let learned = Learned {
-        system: System::MosacAtt,
+        system: System::Gleaner,
         method: "train".into(),
         settings: Defaults::parse_from(["train"]).settings,
         actor: Shape::actor().initialise(&mut ChaCha8Rng::seed_from_u64(1)),

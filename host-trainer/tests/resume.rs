@@ -1,7 +1,7 @@
 //! A killed run goes on exactly where its last checkpoint was.
 
 use clap::Parser;
-use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::{CHECKPOINT, Run, TrainError};
@@ -49,6 +49,7 @@ fn resumes<L: Learner>() {
 
 #[test]
 fn resuming_gives_the_same_bits_as_never_having_stopped() {
+    resumes::<Gleaner>();
     resumes::<MosacAtt>();
     resumes::<MosacCgl>();
     resumes::<DdqnCgl>();
@@ -67,13 +68,13 @@ fn a_folder_with_a_run_of_another_system_is_refused() {
 #[test]
 fn a_folder_with_another_run_is_refused_and_a_longer_run_is_not() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Run::<MosacAtt>::open(settings(&[]), folder.path()).unwrap();
+    let run = Run::<Gleaner>::open(settings(&[]), folder.path()).unwrap();
     run.save(folder.path()).unwrap();
-    let error = Run::<MosacAtt>::open(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
+    let error = Run::<Gleaner>::open(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
     assert!(matches!(error, TrainError::OtherSettings { .. }), "{error}");
     let mut longer = settings(&[]);
     longer.updates = 90;
-    assert!(Run::<MosacAtt>::open(longer, folder.path()).is_ok());
+    assert!(Run::<Gleaner>::open(longer, folder.path()).is_ok());
 }
 
 fn notices_damage<L: Learner>() {
@@ -89,7 +90,7 @@ fn notices_damage<L: Learner>() {
 
 #[test]
 fn a_damaged_checkpoint_is_refused_and_kept() {
-    notices_damage::<MosacAtt>();
+    notices_damage::<Gleaner>();
     notices_damage::<MosacCgl>();
     notices_damage::<DdqnCgl>();
     notices_damage::<MosacFtv>();
@@ -116,7 +117,7 @@ fn survives_a_full_disk<L: Learner>() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_said_and_never_destroys_the_last_good_checkpoint() {
-    survives_a_full_disk::<MosacAtt>();
+    survives_a_full_disk::<Gleaner>();
     survives_a_full_disk::<MosacCgl>();
     survives_a_full_disk::<DdqnCgl>();
     survives_a_full_disk::<MosacFtv>();

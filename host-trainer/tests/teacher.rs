@@ -80,7 +80,7 @@ fn a_pupil_of_its_own_views_is_of_one_mind() {
         ["distil", "--updates", "300", "--batch", "8", "--replay", "3000", "--learning-rate", "0.001"];
     let settings = Command::parse_from(words).settings;
     let mentor = Learned {
-        system: System::MosacAtt,
+        system: System::Gleaner,
         method: "train".into(),
         settings: settings.clone(),
         actor: Shape::actor().initialise(&mut rand_chacha::ChaCha8Rng::seed_from_u64(3)),

@@ -4,14 +4,15 @@ use gleaner_host_trainer::evaluation::{Network, realizations, test_preferences};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::observation::normalise;
-use gleaner_policy::{K_MAX, LOCAL_MAP_CELLS, Tokens};
+use gleaner_policy::schema::TERMINAL_UNITS;
+use gleaner_policy::{K_MAX, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE, Tokens};
 use gleaner_units::ActionMask;
 use gleaner_world::{ScenarioKind, World};
 use rand::{Rng, RngExt};
 use std::sync::Arc;
 
 /// Drawn ones of every size: number i has i mod 13 devices. Numbers reach beyond what flights make, so that the
-/// clips are exercised; yields come in steps of 64 units, as everywhere.
+/// clips are exercised; yields come in steps of 64 units, as everywhere, and the terminal may be beside.
 pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
     let mut number = |low: f32, high: f32| low + (high - low) * rng.random::<f32>();
     (0..count)
@@ -20,13 +21,20 @@ pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
             let device = |_| {
                 let snr_db = number(-40.0, 35.0);
                 let reachable = f32::from(u8::from(snr_db >= 5.0));
-                [number(-800.0, 800.0), number(-600.0, 600.0), number(0.0, 8000.0), snr_db, reachable]
+                let [east, north] = [number(-800.0, 800.0), number(-600.0, 600.0)];
+                let vantage = [east + number(-140.0, 140.0), north + number(-140.0, 140.0)];
+                [east, north, number(0.0, 8000.0), snr_db, reachable, vantage[0], vantage[1]]
             };
             let devices = (0..sample % (K_MAX + 1)).map(device).collect();
+            // South-west of the aircraft, in every other one.
+            let mark = (sample % 2 == 0).then_some(LOCAL_MAP_CELLS / 2 - LOCAL_MAP_SIDE - 1);
             Tokens {
                 uav: [number(0.0, 80.0), number(0.0, 80.0), number(-800.0, 800.0), number(-600.0, 600.0)],
                 preference: [w_data, 1.0 - w_data],
-                local_map: (0..LOCAL_MAP_CELLS).map(|_| 64.0 * number(0.0, 256.0).floor()).collect(),
+                local_map: (0..LOCAL_MAP_CELLS)
+                    .map(|cell| (cell, 64.0 * number(0.0, 256.0).floor()))
+                    .map(|(cell, units)| if mark == Some(cell) { TERMINAL_UNITS } else { units })
+                    .collect(),
                 devices,
             }
         })

@@ -66,7 +66,7 @@ fn ask_onnxruntime(file: &[u8], observations: &[Tokens]) -> Vec<Inference> {
 }
 
 fn device_rows_with_garbage(tokens: &Tokens) -> Vec<f32> {
-    let garbage = [f32::MAX, -1e30, 7.0, f32::MIN, 1e9];
+    let garbage = [f32::MAX, -1e30, 7.0, f32::MIN, 1e9, -3.0, 1e20];
     let rows = tokens.devices.iter().chain(std::iter::repeat(&garbage)).take(K_MAX);
     rows.flatten().copied().collect()
 }

@@ -34,6 +34,7 @@ pub mod native;
 pub mod schema;
 mod situation;
 mod tokens;
+mod vantage;
 mod view;
 mod yields;
 

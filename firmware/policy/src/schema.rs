@@ -68,8 +68,10 @@ pub const YIELD: Normalisation = Normalisation::scale(6400.0);
 
 /// The SNR that stands for "not heard": normalised, the lower clip.
 pub const SNR_NOT_HEARD_DB: f32 = -34.0;
-/// Yields come in steps of so many data units, at most 255 of them: a byte each in the trainer's memory.
+/// Yields come in steps of so many data units, at most 255 of them.
 pub const YIELD_STEP_UNITS: u16 = 64;
+/// What stands in the local map for the terminal, if it is one of the eight cells around: a move there ends the mission.
+pub const TERMINAL_UNITS: f32 = -6400.0;
 /// SNR from which on a device's data flows (paper, Sigma), so that it counts as reachable.
 pub const REACHABLE_SNR_DB: f32 = 5.0;
 
@@ -87,7 +89,7 @@ const fn feature(
 }
 
 /// The table. The local map is one row: its patches are alike, `north * 9 + east` with the nine bands of each axis.
-pub const FEATURES: [Feature; 12] = [
+pub const FEATURES: [Feature; 14] = [
     feature("uav", 0, "spare_battery", "battery units", BATTERY, NEVER),
     feature("uav", 1, "battery", "battery units", BATTERY, NEVER),
     feature("uav", 2, "terminal_east", "m", OFFSET, NEVER),
@@ -97,9 +99,11 @@ pub const FEATURES: [Feature; 12] = [
     feature("devices", 2, "remaining", "data units", REMAINING, "last known, at first the mission's"),
     feature("devices", 3, "snr", "dB", SNR, "-34 when not heard or stale"),
     feature("devices", 4, "reachable", "0 or 1", PLAIN, "0 when not heard or stale"),
+    feature("devices", 5, "vantage_east", "m", OFFSET, "row of zeros, masked"),
+    feature("devices", 6, "vantage_north", "m", OFFSET, "row of zeros, masked"),
     feature("preference", 0, "w_data", "1", PLAIN, NEVER),
     feature("preference", 1, "w_energy", "1", PLAIN, NEVER),
-    feature("local_map", 0, "yield_of_10_slots", "data units", YIELD, "0 outside the map"),
+    feature("local_map", 0, "yield_of_10_slots", "data units", YIELD, "0 outside, -6400 terminal beside"),
 ];
 
 /// The normalisations of one tensor, in index order.
@@ -109,7 +113,7 @@ pub fn normalisations(tensor: &str) -> impl Iterator<Item = Normalisation> {
 
 /// FNV-1a (64 bit) over the table, the token counts and the action order: the model's `schema_hash`. Written down,
 /// and worked out by a test, because only a host can print the table.
-const HASH: u64 = 0x928d_7113_8529_4368;
+const HASH: u64 = 0xff6a_aa16_11c3_177f;
 
 /// The hash of this program's contract.
 #[must_use]

@@ -1,6 +1,7 @@
 //! From a situation to the arrays that enter the model.
 
 use crate::schema::{REACHABLE_SNR_DB, SNR_NOT_HEARD_DB};
+use crate::vantage::vantage;
 use crate::yields::YieldMap;
 use crate::{DeviceState, K_MAX, LOCAL_MAP_CELLS, Situation};
 use gleaner_units::Cell;
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Numbers of the aircraft's token.
 pub(crate) const UAV_FEATURES: usize = 4;
 /// Numbers of a device's token.
-pub(crate) const DEVICE_FEATURES: usize = 5;
+pub(crate) const DEVICE_FEATURES: usize = 7;
 
 /// The model's input in physical units, in [`crate::schema`] order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,9 +20,10 @@ pub struct Tokens {
     pub uav: [f32; UAV_FEATURES],
     /// `w_data`, `w_energy`.
     pub preference: [f32; 2],
-    /// What a stay would bring here and around (data units), south-west first, row by row.
+    /// What a stay would bring here and around (data units), south-west first, row by row; the terminal beside.
     pub local_map: Vec<f32, LOCAL_MAP_CELLS>,
-    /// East, north (m), remaining (data units), SNR (dB), reachable: the devices that are present.
+    /// East, north (m), remaining (data units), SNR (dB), reachable, vantage east, vantage north (m): the devices that are
+    /// present.
     pub devices: Vec<[f32; DEVICE_FEATURES], K_MAX>,
 }
 
@@ -61,12 +63,16 @@ impl Tokens {
             let [east_m, north_m] = offset_m(device.cell);
             let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
             let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
+            let vantage = vantage(situation.sight, situation.altitude, device.cell, situation.cell);
+            let [vantage_east_m, vantage_north_m] = vantage.map(|cells| cells * cell_m);
             let token = [
                 east_m,
                 north_m,
                 if device.remaining.is_finite() { device.remaining.max(0.0) } else { 0.0 },
                 snr_db.unwrap_or(SNR_NOT_HEARD_DB),
                 f32::from(u8::from(reachable)),
+                vantage_east_m,
+                vantage_north_m,
             ];
             if tokens.devices.is_full() {
                 replace_weakest(&mut tokens.devices, &mut slots, token, index);
@@ -75,14 +81,14 @@ impl Tokens {
                 let _ = slots.push(index);
             }
         }
-        tokens.local_map = yields.patches();
+        tokens.local_map = yields.patches(situation.terminal);
         (tokens, slots)
     }
 }
 
 /// Highest SNR first, then nearest.
 fn precedes(a: &[f32; DEVICE_FEATURES], b: &[f32; DEVICE_FEATURES]) -> bool {
-    let rank = |&[east_m, north_m, _, snr_db, _]: &[f32; DEVICE_FEATURES]| {
+    let rank = |&[east_m, north_m, _, snr_db, ..]: &[f32; DEVICE_FEATURES]| {
         (snr_db, -(east_m * east_m + north_m * north_m))
     };
     rank(a) > rank(b)
@@ -142,9 +148,9 @@ mod tests {
         let (tokens, slots) = Tokens::build(&situation(&sight, 10, 6), [heard, unheard, broken]);
         assert_eq!(tokens.uav, [48.0, 80.0, 400.0, 240.0]);
         assert_eq!(tokens.preference, [0.25, 0.75]);
-        assert_eq!(tokens.devices[0], [20.0, -40.0, 6000.0, 5.0, 1.0]);
-        assert_eq!(tokens.devices[1], [20.0, -40.0, 6000.0, SNR_NOT_HEARD_DB, 0.0]);
-        assert_eq!(tokens.devices[2], [20.0, -40.0, 0.0, SNR_NOT_HEARD_DB, 0.0]);
+        assert_eq!(tokens.devices[0], [20.0, -40.0, 6000.0, 5.0, 1.0, 0.0, 0.0]);
+        assert_eq!(tokens.devices[1], [20.0, -40.0, 6000.0, SNR_NOT_HEARD_DB, 0.0, 0.0, 0.0]);
+        assert_eq!(tokens.devices[2], [20.0, -40.0, 0.0, SNR_NOT_HEARD_DB, 0.0, 0.0, 0.0]);
         assert_eq!(slots.as_slice(), [0, 1, 2]);
     }
 

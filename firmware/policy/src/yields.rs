@@ -7,8 +7,12 @@
 //!
 //! The network sees [`LOCAL_MAP_SIDE`] by [`LOCAL_MAP_SIDE`] numbers, fine near the aircraft and coarse far away: per
 //! axis the bands -15..-8, -7..-4, -3..-2, -1, 0, 1, 2..3, 4..7, 8..15, and of each patch its best cell.
+//!
+//! The terminal, when it is one of the eight cells around, stands in the map as [`TERMINAL_UNITS`]: a move there ends
+//! the mission. In its offset alone, which is scaled for the whole city, one cell is too little to be seen: policies
+//! flew over their base in the middle of a mission, and it was over.
 
-use crate::schema::YIELD_STEP_UNITS;
+use crate::schema::{TERMINAL_UNITS, YIELD_STEP_UNITS};
 use crate::{DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
 use gleaner_units::{Cell, Metres, Sight};
 use heapless::Vec;
@@ -38,7 +42,7 @@ const TABLE_STEP_M2: f32 = 1200.0;
 const RANGE_M2: f32 = TABLE_STEP_M2 * (UNITS_PER_SLOT.len() - 1) as f32;
 
 /// Data units per slot at this distance squared: the table, with straight lines between its entries.
-fn units_per_slot(distance_m2: f32) -> f32 {
+pub(crate) fn units_per_slot(distance_m2: f32) -> f32 {
     let place = distance_m2 / TABLE_STEP_M2;
     let index = place as usize;
     let (Some(&near), Some(&far)) = (UNITS_PER_SLOT.get(index), UNITS_PER_SLOT.get(index + 1)) else {
@@ -98,11 +102,17 @@ impl<'a> YieldMap<'a> {
     }
 
     /// The numbers that enter the model: data units, south-west first, row by row.
-    pub(crate) fn patches(&self) -> Vec<f32, LOCAL_MAP_CELLS> {
+    pub(crate) fn patches(&self, terminal: Cell) -> Vec<f32, LOCAL_MAP_CELLS> {
         let mut patches = Vec::new();
+        let (x, y) = (terminal.x.saturating_sub(self.center.x), terminal.y.saturating_sub(self.center.y));
+        let is_beside = (x, y) != (0, 0);
         let band = |(first, last): (i16, i16)| (REACH + first) as usize..=(REACH + last) as usize;
         for north in BANDS {
             for east in BANDS {
+                if is_beside && east == (x, x) && north == (y, y) {
+                    let _ = patches.push(TERMINAL_UNITS);
+                    continue;
+                }
                 let lines = self.units.get(band(north)).into_iter().flatten();
                 let best = lines.flat_map(|line| line.get(band(east)).into_iter().flatten()).max();
                 let steps = (best.copied().unwrap_or(0) / YIELD_STEP_UNITS).min(STEPS_MAX);
@@ -126,7 +136,7 @@ mod tests {
         let rays = Rays { heights, altitude_m: 60 };
         let mut map = YieldMap::new(&rays, Cell::new(20, 15), Metres(60.0));
         devices.iter().for_each(|device| map.add(device));
-        map.patches().to_vec()
+        map.patches(Cell::new(0, 0)).to_vec()
     }
 
     fn at(map: &[f32], column: usize, row: usize) -> f32 {
@@ -194,6 +204,31 @@ mod tests {
         let rays = Rays { heights: &heights, altitude_m: 60 };
         let mut corner = YieldMap::new(&rays, Cell::new(0, 0), Metres(60.0));
         corner.add(&device(0, 0, 8000.0));
-        assert!(corner.patches()[..4 * LOCAL_MAP_SIDE].iter().all(|&units| units == 0.0));
+        let patches = corner.patches(Cell::new(30, 18));
+        assert!(patches[..4 * LOCAL_MAP_SIDE].iter().all(|&units| units == 0.0));
+    }
+
+    #[test]
+    fn the_terminal_is_marked_where_one_move_or_two_would_end_the_mission() {
+        let flat = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
+        let rays = Rays { heights: &flat, altitude_m: 60 };
+        let map = YieldMap::new(&rays, Cell::new(20, 15), Metres(60.0));
+        for (terminal, mark) in [
+            ((20, 16), Some((4, 5))),
+            ((19, 15), Some((3, 4))),
+            ((21, 14), Some((5, 3))),
+            // Above it: it is entered by a move, not by a stay.
+            ((20, 15), None),
+            ((22, 15), None),
+            ((20, 13), None),
+            ((i16::MAX, i16::MIN), None),
+        ] {
+            let patches = map.patches(Cell::new(terminal.0, terminal.1));
+            let mut expected = [0.0; LOCAL_MAP_CELLS];
+            if let Some((column, row)) = mark {
+                expected[row * LOCAL_MAP_SIDE + column] = TERMINAL_UNITS;
+            }
+            assert_eq!(patches, expected, "{terminal:?}");
+        }
     }
 }

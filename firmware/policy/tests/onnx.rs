@@ -13,7 +13,7 @@ use prost::Message;
 use std::sync::LazyLock;
 
 /// Numbers of all inputs together.
-const WIDTH: usize = 4 + 12 * 5 + 12 + 2 + LOCAL_MAP_CELLS;
+const WIDTH: usize = 4 + 12 * 7 + 12 + 2 + LOCAL_MAP_CELLS;
 
 fn weight(action: usize, number: usize) -> f32 {
     ((action * 31 + number * 7) % 19) as f32 / 64.0 - 0.125
@@ -24,7 +24,7 @@ fn expected(tokens: &Tokens) -> [f32; 5] {
     let mut numbers = tokens.uav.to_vec();
     let present = tokens.devices.len();
     numbers.extend(tokens.devices.iter().flatten());
-    numbers.extend(vec![0.0; (K_MAX - present) * 5]);
+    numbers.extend(vec![0.0; (K_MAX - present) * 7]);
     numbers.extend((0..K_MAX).map(|slot| f32::from(u8::from(slot < present))));
     numbers.extend(tokens.preference);
     numbers.extend(&tokens.local_map);
@@ -38,7 +38,9 @@ fn tokens() -> Tokens {
         uav: [48.0, 80.0, 400.0, -240.0],
         preference: [0.25, 0.75],
         local_map: (0..LOCAL_MAP_CELLS).map(|cell| 64.0 * cell as f32).collect(),
-        devices: [[20.0, -40.0, 6000.0, 5.0, 1.0], [60.0, 0.0, 10.0, -34.0, 0.0]].into_iter().collect(),
+        devices: [[20.0, -40.0, 6000.0, 5.0, 1.0, 0.0, 0.0], [60.0, 0.0, 10.0, -34.0, 0.0, 20.0, 40.0]]
+            .into_iter()
+            .collect(),
     }
 }
 

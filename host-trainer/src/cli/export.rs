@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
         bail!("--realizations 0: a card without measurements is no card; give at least 1");
     }
-    let learned = learned_of(System::MosacAtt, &arguments.run)?;
+    let learned = learned_of(System::Gleaner, &arguments.run)?;
     let world = Arc::new(World::default_world());
     let commit = match &arguments.commit {
         Some(commit) => commit.clone(),

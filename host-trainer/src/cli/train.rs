@@ -4,7 +4,7 @@ use super::learned_of;
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::curves::{Curves, scalars_in};
 use gleaner_host_trainer::distil::Distillation;
-use gleaner_host_trainer::learner::{DdqnCgl, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
 use gleaner_host_trainer::refine::Refinement;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
@@ -36,8 +36,9 @@ pub struct Arguments {
 /// What only learning by trial takes.
 #[derive(Debug, clap::Args)]
 pub struct TrainArguments {
-    /// Which of the paper's systems: mosac-att, mosac-cgl, ddqn-cgl or mosac-ftv. Only mosac-att can be exported.
-    #[arg(long, default_value = "mosac-att")]
+    /// What learns: gleaner, the policy that flies, or one of the paper's systems, mosac-att, mosac-cgl, ddqn-cgl or
+    /// mosac-ftv. Only gleaner can be exported.
+    #[arg(long, default_value = "gleaner")]
     system: System,
     #[command(flatten)]
     usual: Arguments,
@@ -70,12 +71,13 @@ pub struct RefineArguments {
     usual: Arguments,
 }
 
-/// Learns by trial: one of the paper's systems.
+/// Learns by trial: the policy that flies or one of the paper's systems.
 pub fn run(arguments: &TrainArguments) -> Result<()> {
     let TrainArguments { system, usual } = arguments;
     let in_paper = system.parameter_count_in_paper().map(|count| format!(" (the paper: {count})"));
     println!("{}: {} parameters{}", system.title(), system.parameter_count(), in_paper.unwrap_or_default());
     match system {
+        System::Gleaner => by_trial::<Gleaner>(usual),
         System::MosacAtt => by_trial::<MosacAtt>(usual),
         System::MosacCgl => by_trial::<MosacCgl>(usual),
         System::DdqnCgl => by_trial::<DdqnCgl>(usual),
@@ -106,11 +108,11 @@ fn by_trial<L: Learner>(arguments: &Arguments) -> Result<()> {
 
 /// Learns from the planner: distillation.
 pub fn distil(arguments: &DistilArguments) -> Result<()> {
-    let from = arguments.from.as_deref().map(|folder| learned_of(System::MosacAtt, folder)).transpose()?;
-    let mentors = arguments.mentor.iter().map(|folder| learned_of(System::MosacAtt, folder));
+    let from = arguments.from.as_deref().map(|folder| learned_of(System::Gleaner, folder)).transpose()?;
+    let mentors = arguments.mentor.iter().map(|folder| learned_of(System::Gleaner, folder));
     let mentors = mentors.collect::<Result<Vec<_>>>()?;
     let arguments = &arguments.usual;
-    let mut desk = Desk::open(System::MosacAtt, arguments)?;
+    let mut desk = Desk::open(System::Gleaner, arguments)?;
     let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref(), mentors)?;
     desk.begin(run.update())?;
     while !run.is_done() {
@@ -134,10 +136,10 @@ pub fn distil(arguments: &DistilArguments) -> Result<()> {
 
 /// Learns from its own flights: refinement.
 pub fn refine(arguments: &RefineArguments) -> Result<()> {
-    let from = learned_of(System::MosacAtt, &arguments.from)?;
+    let from = learned_of(System::Gleaner, &arguments.from)?;
     let confidence = arguments.confidence;
     let arguments = &arguments.usual;
-    let mut desk = Desk::open(System::MosacAtt, arguments)?;
+    let mut desk = Desk::open(System::Gleaner, arguments)?;
     let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, &from, confidence)?;
     desk.begin(run.update())?;
     while !run.is_done() {
@@ -243,7 +245,7 @@ impl<'a> Desk<'a> {
     fn end(&self) {
         self.bar.abandon();
         let out = self.arguments.out.display();
-        if self.system == System::MosacAtt {
+        if self.system == System::Gleaner {
             println!("done; next: gleaner-train export --run {out} --model models/mine.onnx");
         } else {
             println!("done; next: gleaner-train evaluate --run {out}");

@@ -18,7 +18,9 @@ fn observation(devices: usize) -> Tokens {
         uav: [40.0, 72.0, 300.0, -260.0],
         preference: [0.5, 0.5],
         local_map: (0..LOCAL_MAP_CELLS).map(|cell| 64.0 * cell as f32).collect(),
-        devices: (0..devices).map(|n| [20.0 * n as f32, 40.0, 900.0 * n as f32, 12.0, 1.0]).collect(),
+        devices: (0..devices)
+            .map(|n| [20.0 * n as f32, 40.0, 900.0 * n as f32, 12.0, 1.0, 10.0 * n as f32, 20.0])
+            .collect(),
     }
 }
 
@@ -31,7 +33,7 @@ fn what_is_written_can_be_loaded_and_read_back() {
     assert_eq!(file, export(&actor, Shape::actor(), &card(), &goldens).unwrap(), "the same bytes each time");
     let mut policy = TractPolicy::load_checked(&file).unwrap();
     assert_eq!(policy.info().card, card());
-    assert_eq!(policy.info().parameters, 89_861);
+    assert_eq!(policy.info().parameters, 89_989);
     assert_eq!(policy.goldens(), goldens, "to the last bit");
     assert_eq!(read_actor(&file).unwrap(), actor);
     let answer = policy.infer(&observations[2]).unwrap();
@@ -63,7 +65,7 @@ fn what_cannot_fly_is_not_written() {
     assert_eq!(write(&parameters, critic, &goldens), Err(ExportError::NotAnActor { outputs: 10 }));
     assert_eq!(
         write(&parameters, Shape::actor(), &goldens),
-        Err(ExportError::Length { expected: 89_861, found: parameters.len() })
+        Err(ExportError::Length { expected: 89_989, found: parameters.len() })
     );
     let mut diverged = fresh();
     diverged[4 * 64 + 2] = f32::NAN;

@@ -34,8 +34,9 @@ impl Sample {
         let mut seen = *self;
         seen.uav[2..].copy_from_slice(&view.offset([self.uav[2], self.uav[3]]));
         for device in &mut seen.devices {
-            let offset = view.offset([device[0], device[1]]);
-            device[..2].copy_from_slice(&offset);
+            for [first, second] in [[0, 1], [5, 6]] {
+                [device[first], device[second]] = view.offset([device[first], device[second]]);
+            }
         }
         for row in 0..LOCAL_MAP_SIDE {
             for column in 0..LOCAL_MAP_SIDE {
@@ -68,9 +69,9 @@ pub struct Batch {
     pub(super) uav: Vec<f32>,
     /// `[samples, PREFERENCE_FEATURES]`.
     pub(super) preference: Vec<f32>,
-    /// `[samples, MAP_CELLS]`.
+    /// `[samples, map_cells]`.
     pub(super) local_map: Vec<f32>,
-    /// `[devices of all samples, DEVICE_FEATURES]`.
+    /// `[devices of all samples, device_features]`.
     pub(super) devices: Vec<f32>,
     /// First device of each sample and, last, the number of all devices: `[samples + 1]`.
     pub(super) first_device: Vec<usize>,
@@ -104,23 +105,24 @@ impl Batch {
         self.first_device.truncate(1);
     }
 
-    /// Appends one sample of normalised features; `devices` are those present, in any order.
+    /// Appends one sample of normalised features, as many as the network's [`super::Shape`] says; `devices` are those
+    /// present, in any order.
     ///
     /// # Panics
     /// With more than [`DEVICES_MAX`] devices.
-    pub fn push(
+    pub fn push<const MAP: usize, const DEVICE: usize>(
         &mut self,
         uav: &[f32; UAV_FEATURES],
         preference: &[f32; PREFERENCE_FEATURES],
-        local_map: &[f32; MAP_CELLS],
-        devices: &[DeviceFeatures],
+        local_map: &[f32; MAP],
+        devices: &[[f32; DEVICE]],
     ) {
         assert!(devices.len() <= DEVICES_MAX, "{} devices in one sample", devices.len());
         self.uav.extend_from_slice(uav);
         self.preference.extend_from_slice(preference);
         self.local_map.extend_from_slice(local_map);
         self.devices.extend_from_slice(devices.as_flattened());
-        self.first_device.push(self.devices.len() / DEVICE_FEATURES);
+        self.first_device.push(self.device_total() + devices.len());
     }
 
     /// Appends a sample as it is.
@@ -138,6 +140,11 @@ impl Batch {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Devices of all samples.
+    pub(super) fn device_total(&self) -> usize {
+        self.first_device.last().copied().unwrap_or(0)
     }
 
     /// Devices present in one sample.

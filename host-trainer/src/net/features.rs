@@ -3,12 +3,14 @@
 use super::architecture::{Architecture, Samples};
 use super::head::{HeadLayout, HeadMemory, Preferences};
 use super::matrix::{CutWeights, Panels};
-use super::shape::{DEVICE_FEATURES, DEVICES_MAX, PREFERENCE_FEATURES, Ruler, Tensor, UAV_FEATURES};
+use super::shape::{DEVICES_MAX, PREFERENCE_FEATURES, Ruler, Tensor, UAV_FEATURES};
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
+/// Numbers of a device, those of the paper: the first ones of its token.
+pub const VECTOR_DEVICE_FEATURES: usize = 5;
 /// Numbers of a state: the UAV, then a place for each device that there may be.
-pub const VECTOR_FEATURES: usize = UAV_FEATURES + DEVICES_MAX * DEVICE_FEATURES;
+pub const VECTOR_FEATURES: usize = UAV_FEATURES + DEVICES_MAX * VECTOR_DEVICE_FEATURES;
 /// States that go through the network together.
 const CHUNK: usize = 32;
 

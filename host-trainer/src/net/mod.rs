@@ -11,7 +11,7 @@
 //! uav 4 ───────► 64 ┐
 //! preference 2 ► 64 ├► 2 x encoder layer ─► uav, preference, map ─┐
 //! map 81 ──────► 64 │                       max over devices ─────┴► 256 ► 64 relu ► outputs
-//! devices n x 5 ► 64 ┘
+//! devices n x 7 ► 64 ┘
 //! encoder layer: x = norm(x + out(attention(qkv(x)))); x = norm(x + ff2(relu(ff1(x))))
 //! ```
 //!
@@ -59,7 +59,7 @@ mod tests;
 
 pub use architecture::{Architecture, Samples};
 pub use batch::{Batch, DeviceFeatures, Sample};
-pub use features::{VECTOR_FEATURES, VectorBatch, VectorShape, VectorWorkspace};
+pub use features::{VECTOR_DEVICE_FEATURES, VECTOR_FEATURES, VectorBatch, VectorShape, VectorWorkspace};
 pub use maps::{
     GLOBAL_NUMBERS, GLOBAL_SIZE, GLOBAL_WINDOW, LOCAL_NUMBERS, LOCAL_SIDE, MAP_CHANNELS, MapBatch, MapShape,
     MapWorkspace,

@@ -141,9 +141,10 @@ fn projectors(layout: &Layout) -> [Linear; 4] {
 
 fn forward_chunk(net: Net<'_>, batch: &Batch, chunk: &mut Activations, outputs: &mut [f32]) {
     let Net { layout, parameters, weights } = net;
-    let inputs = chunk.inputs(batch);
+    let projectors = projectors(layout);
+    let inputs = chunk.inputs(batch, projectors.map(|projector| projector.inputs));
     let mut place = &mut chunk.embedded[..];
-    for (projector, input) in projectors(layout).into_iter().zip(inputs) {
+    for (projector, input) in projectors.into_iter().zip(inputs) {
         let (block, rest) = place.split_at_mut(input.len() / projector.inputs * WIDTH);
         projector.forward(parameters, weights, input, block);
         place = rest;
@@ -243,7 +244,9 @@ fn backward_chunk(
     }
 
     let mut d = &scratch.d_tokens[..];
-    for (projector, input) in projectors(layout).into_iter().zip(chunk.inputs(batch)) {
+    let projectors = projectors(layout);
+    let inputs = chunk.inputs(batch, projectors.map(|projector| projector.inputs));
+    for (projector, input) in projectors.into_iter().zip(inputs) {
         let (block, rest) = d.split_at(input.len() / projector.inputs * WIDTH);
         projector.backward_parameters(input, block, &mut scratch.panels, gradients);
         d = rest;

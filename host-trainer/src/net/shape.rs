@@ -18,11 +18,11 @@ pub const FIXED_TOKENS: usize = 3;
 pub const TOKENS_MAX: usize = FIXED_TOKENS + DEVICES_MAX;
 /// Features of the UAV token.
 pub const UAV_FEATURES: usize = 4;
-/// Features of one device token.
-pub const DEVICE_FEATURES: usize = 5;
+/// Features of one device token of the policy that flies.
+pub const DEVICE_FEATURES: usize = 7;
 /// Features of the preference token.
 pub const PREFERENCE_FEATURES: usize = 2;
-/// Cells of the local map.
+/// Numbers of the local map of the policy that flies.
 pub const MAP_CELLS: usize = gleaner_policy::LOCAL_MAP_CELLS;
 /// What the head reads: UAV, preference, map and the pooled devices.
 pub const HEAD_INPUTS: usize = 4 * WIDTH;
@@ -32,6 +32,10 @@ pub const LAYER_NORM_EPSILON: f32 = 1e-5;
 /// The sizes that differ between networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Shape {
+    /// Numbers of the local map.
+    pub map_cells: usize,
+    /// Numbers of one device.
+    pub device_features: usize,
     /// Hidden width of the feed-forward block of each encoder layer.
     pub feed_forward: usize,
     /// Hidden width of the head.
@@ -195,8 +199,8 @@ impl Layout {
         let mut linear = |inputs, outputs| ruler.linear(inputs, outputs);
         let project_uav = linear(UAV_FEATURES, WIDTH);
         let project_preference = linear(PREFERENCE_FEATURES, WIDTH);
-        let project_map = linear(MAP_CELLS, WIDTH);
-        let project_device = linear(DEVICE_FEATURES, WIDTH);
+        let project_map = linear(shape.map_cells, WIDTH);
+        let project_device = linear(shape.device_features, WIDTH);
         let encoder = std::array::from_fn(|_| {
             // A norm is as long as a linear layer with one input: a gain and a bias.
             let qkv = linear(WIDTH, 3 * WIDTH);
@@ -240,16 +244,29 @@ impl Layout {
 }
 
 impl Shape {
-    /// The actor: five logits, 89,861 parameters.
+    /// The actor that flies: five logits, 89,989 parameters.
     #[must_use]
     pub const fn actor() -> Self {
-        Self { feed_forward: 128, head: 64, outputs: 5 }
+        Self {
+            map_cells: MAP_CELLS,
+            device_features: DEVICE_FEATURES,
+            feed_forward: 128,
+            head: 64,
+            outputs: 5,
+        }
     }
 
     /// A critic: five actions x two objectives, index `action * 2 + objective`.
     #[must_use]
     pub const fn critic() -> Self {
-        Self { feed_forward: 128, head: 64, outputs: 10 }
+        Self { outputs: 10, ..Self::actor() }
+    }
+
+    /// The network of the paper's text: 10 x 10 cells of buildings, five numbers a device, a head of 128; 107,845
+    /// parameters with five outputs.
+    #[must_use]
+    pub const fn paper(outputs: usize) -> Self {
+        Self { map_cells: 100, device_features: 5, feed_forward: 128, head: 128, outputs }
     }
 
     /// Length of the flat parameter vector.
@@ -296,7 +313,7 @@ mod tests {
 
     #[test]
     fn tensors_tile_the_flat_vector() {
-        for shape in [Shape::actor(), Shape::critic()] {
+        for shape in [Shape::actor(), Shape::critic(), Shape::paper(5)] {
             let mut next = 0;
             for tensor in shape.tensors() {
                 assert_eq!(tensor.offset, next, "{}", tensor.name);
@@ -304,7 +321,8 @@ mod tests {
             }
             assert_eq!(next, shape.parameter_count());
         }
-        assert_eq!(Shape::actor().parameter_count(), 89_861);
-        assert_eq!(Shape::critic().parameter_count(), 90_186);
+        assert_eq!(Shape::actor().parameter_count(), 89_989);
+        assert_eq!(Shape::critic().parameter_count(), 90_314);
+        assert_eq!(Shape::paper(5).parameter_count(), 107_845);
     }
 }

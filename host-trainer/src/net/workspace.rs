@@ -6,10 +6,7 @@ use super::attention::KEPT;
 use super::batch::Batch;
 use super::lanes::LANES;
 use super::matrix::{CutWeights, Panels};
-use super::shape::{
-    DEVICE_FEATURES, FIXED_TOKENS, HEAD_INPUTS, HEADS, LAYERS, MAP_CELLS, PREFERENCE_FEATURES, Shape,
-    TOKENS_MAX, UAV_FEATURES, WIDTH,
-};
+use super::shape::{FIXED_TOKENS, HEAD_INPUTS, HEADS, LAYERS, Shape, TOKENS_MAX, WIDTH};
 
 /// Samples that go through the whole network together: few enough for their activations to stay
 /// in the second-level cache. Fixed, because the sums of gradients depend on it.
@@ -88,6 +85,11 @@ pub(super) struct Activations {
 impl Activations {
     /// Makes room for the samples of one chunk.
     pub fn prepare(&mut self, shape: Shape, batch: &Batch, samples: Range<usize>) {
+        assert!(
+            batch.local_map.len() == batch.len() * shape.map_cells
+                && batch.devices.len() == batch.device_total() * shape.device_features,
+            "samples of another network"
+        );
         self.devices = batch.first_device[samples.start]..batch.first_device[samples.end];
         self.tokens.lay_out(batch, samples.clone());
         let tokens = self.tokens.len();
@@ -114,16 +116,16 @@ impl Activations {
         self.samples = samples;
     }
 
-    /// The chunk's part of each of the batch's matrices: UAVs, preferences, maps, devices.
-    pub fn inputs<'a>(&self, batch: &'a Batch) -> [&'a [f32]; 4] {
+    /// The chunk's part of each of the batch's matrices: UAVs, preferences, maps, devices; so many columns each.
+    pub fn inputs<'a>(&self, batch: &'a Batch, columns: [usize; 4]) -> [&'a [f32]; 4] {
         let part = |matrix: &'a [f32], rows: &Range<usize>, columns: usize| {
             &matrix[rows.start * columns..rows.end * columns]
         };
         [
-            part(&batch.uav, &self.samples, UAV_FEATURES),
-            part(&batch.preference, &self.samples, PREFERENCE_FEATURES),
-            part(&batch.local_map, &self.samples, MAP_CELLS),
-            part(&batch.devices, &self.devices, DEVICE_FEATURES),
+            part(&batch.uav, &self.samples, columns[0]),
+            part(&batch.preference, &self.samples, columns[1]),
+            part(&batch.local_map, &self.samples, columns[2]),
+            part(&batch.devices, &self.devices, columns[3]),
         ]
     }
 }

@@ -225,8 +225,10 @@ const DEVICE: [Normalisation; DEVICE_FEATURES] = [
     FEATURES[6].normalisation,
     FEATURES[7].normalisation,
     FEATURES[8].normalisation,
+    FEATURES[9].normalisation,
+    FEATURES[10].normalisation,
 ];
-const PREFERENCE: [Normalisation; 2] = [FEATURES[9].normalisation, FEATURES[10].normalisation];
+const PREFERENCE: [Normalisation; 2] = [FEATURES[11].normalisation, FEATURES[12].normalisation];
 
 fn normalise<const N: usize>(numbers: &[f32; N], table: &[Normalisation; N]) -> [f32; N] {
     let mut normalised = [0.0; N];

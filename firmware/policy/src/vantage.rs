@@ -1,0 +1,96 @@
+//! The vantage of a device: the place to fly to for it.
+//!
+//! Where a device stands says little of where it is heard: a tower next to it hides it from half of the city. Map and
+//! channel are known on board, so the builder works out the nearest cell from which a device is in sight and close
+//! enough to send fast. Where that is, and how many moves away, is what a mission is planned by.
+
+use crate::yields::units_per_slot;
+use gleaner_units::{Cell, Metres, Sight};
+
+/// Data units that a slot at a vantage carries, at least.
+const FAST_UNITS: f32 = 400.0;
+/// So many cells away a device is never that fast at the lowest altitude, 20 m, and cells of 20 m.
+const REACH: i16 = 7;
+
+/// East and north offset, cells, of the nearest vantage of the device at `device` from the aircraft at `from`, the
+/// fastest of those that are as near; of several as fast the middle, so that a mirrored city has the mirrored vantage.
+/// Without one, the device itself.
+///
+/// # Cost
+/// At most one ray for each of the 149 cells around the device, only for those that are nearer than the best so far.
+pub(crate) fn vantage(sight: &dyn Sight, altitude: Metres, device: Cell, from: Cell) -> [f32; 2] {
+    let grid = sight.grid();
+    let cell_m2 = grid.cell().0 * grid.cell().0;
+    let height_m2 = altitude.0 * altitude.0;
+    let mut best = (i32::MAX, i32::MAX);
+    let (mut sum, mut count) = ([0_i32; 2], 0_i32);
+    for north in -REACH..=REACH {
+        for east in -REACH..=REACH {
+            let cells2 = i32::from(north) * i32::from(north) + i32::from(east) * i32::from(east);
+            let cell = Cell::new(device.x.saturating_add(east), device.y.saturating_add(north));
+            let offset = [i32::from(cell.x) - i32::from(from.x), i32::from(cell.y) - i32::from(from.y)];
+            let rank = (offset.iter().map(|cells| cells.abs()).sum(), cells2);
+            if rank > best
+                || units_per_slot(cells2 as f32 * cell_m2 + height_m2) < FAST_UNITS
+                || !grid.contains(cell)
+                || !sight.sees(device, cell)
+            {
+                continue;
+            }
+            if rank < best {
+                (best, sum, count) = (rank, [0; 2], 0);
+            }
+            sum = [sum[0] + offset[0], sum[1] + offset[1]];
+            count += 1;
+        }
+    }
+    match count {
+        0 => [f32::from(device.x) - f32::from(from.x), f32::from(device.y) - f32::from(from.y)],
+        count => sum.map(|cells| cells as f32 / count as f32),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gleaner_units::{Grid, HeightMap, Rays};
+
+    fn flat() -> HeightMap {
+        HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap())
+    }
+
+    fn seen(heights: &HeightMap, device: (i16, i16), from: (i16, i16)) -> [f32; 2] {
+        let rays = Rays { heights, altitude_m: 60 };
+        vantage(&rays, Metres(60.0), Cell::new(device.0, device.1), Cell::new(from.0, from.1))
+    }
+
+    #[test]
+    fn over_open_ground_it_is_as_far_as_the_rate_reaches() {
+        // 400 units a slot: 21,900 m2 in space, six cells and a half on the ground.
+        assert_eq!(seen(&flat(), (20, 15), (20, 15)), [0.0, 0.0]);
+        assert_eq!(seen(&flat(), (20, 15), (24, 15)), [0.0, 0.0], "it is one already");
+        assert_eq!(seen(&flat(), (20, 15), (30, 15)), [-4.0, 0.0]);
+        assert_eq!(seen(&flat(), (20, 15), (20, 0)), [0.0, 9.0]);
+        // From the diagonal (4, 5) and (5, 4) are equally near and fast: the middle.
+        assert_eq!(seen(&flat(), (20, 15), (30, 25)), [-5.5, -5.5]);
+    }
+
+    #[test]
+    fn a_wall_hides_what_is_near_and_the_edge_of_the_map_is_the_end() {
+        let mut heights = flat();
+        for y in 0..30 {
+            heights.set(Cell::new(21, y), 50);
+        }
+        assert_eq!(seen(&heights, (20, 15), (30, 15)), [-10.0, 0.0], "nothing east of the wall is in sight");
+        assert_eq!(seen(&heights, (20, 15), (10, 15)), [4.0, 0.0]);
+        assert_eq!(seen(&flat(), (0, 0), (0, 29)), [0.0, -23.0]);
+    }
+
+    #[test]
+    fn no_vantage_at_all_is_the_device() {
+        let rays = Rays { heights: &flat(), altitude_m: 200 };
+        assert_eq!(vantage(&rays, Metres(200.0), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
+        let beyond = Cell::new(i16::MAX, i16::MIN);
+        assert_eq!(vantage(&rays, Metres(60.0), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
+    }
+}
