@@ -10,6 +10,10 @@
 //! costs what it costs at once. A critic that sees what the policy sees learns how much it goes on to lose, and advantages
 //! look some slots ahead (Schulman et al. 2016).
 //!
+//! What a policy is sure of it never tries otherwise, and the critic expects the loss: where it is wrong and sure, policy
+//! gradients are blind. But the planner has seen what the slot lost. So each loss that is more than noise also makes
+//! the action itself less likely (unlikelihood, Welleck et al. 2020), the more the surer the policy was.
+//!
 //! Each mission is seen in one of the eight views, turned or mirrored, so that nothing is learned of north alone.
 
 use crate::checkpoint::{self, CheckpointError};
@@ -60,6 +64,10 @@ const PREFERENCE_BINS: usize = 11;
 const SPREAD_MIN: f32 = 0.3;
 /// Advantages beyond this many deviations count as this much: one lost mission must not turn the policy over.
 const ADVANTAGE_MAX: f32 = 8.0;
+/// Losses up to this are noise of the planner and of the channel, utility.
+const NOISE: f32 = 0.5;
+/// Weight of the unlikelihood, in standard deviations of the advantage.
+const UNLIKELIHOOD: f32 = 1.0;
 /// The longest gradient that is followed.
 const GRADIENT_MAX: f32 = 0.5;
 /// Share of the actor that its running average takes over per update.
@@ -432,6 +440,8 @@ struct Lesson {
     advantage: f32,
     /// What was gained from here on: the critic's target.
     gained: f32,
+    /// What the slot alone lost beyond the noise, in the unit of the advantage.
+    lost: f32,
 }
 
 /// Generalised advantages of one flight's slots; `ahead` is what the critic expects after the last.
@@ -450,6 +460,7 @@ fn judge(experiences: Vec<Experience>, ahead: f32) -> Vec<Lesson> {
             log_probability: experience.log_probability,
             advantage,
             gained: advantage + experience.value,
+            lost: (-experience.gain - NOISE).max(0.0),
         });
         (next_value, next_advantage) = (experience.value, advantage);
     }
@@ -468,8 +479,9 @@ fn even_out(lessons: &mut [Lesson]) {
     }
     for lesson in lessons {
         let (squares, count) = sums[bin(lesson)];
-        let evened = lesson.advantage / (squares / count).sqrt().max(SPREAD_MIN);
-        lesson.advantage = evened.clamp(-ADVANTAGE_MAX, ADVANTAGE_MAX);
+        let spread = (squares / count).sqrt().max(SPREAD_MIN);
+        lesson.advantage = (lesson.advantage / spread).clamp(-ADVANTAGE_MAX, ADVANTAGE_MAX);
+        lesson.lost = (lesson.lost / spread).min(ADVANTAGE_MAX);
     }
 }
 
@@ -487,7 +499,25 @@ impl Lesson {
             let chosen = if action == self.action.index() { 1.0 } else { 0.0 };
             *gradient = -push * (chosen - p) + ENTROPY * p * (policy.log_probability[action] + entropy);
         }
+        self.unlearn(&policy, gradient);
         (entropy, ratio - 1.0 - change)
+    }
+}
+
+impl Lesson {
+    /// Adds the gradient of `-lost log(1 - p)`, p the probability of the action: unlike a policy's, it does not vanish
+    /// where the policy is sure. What the action gives up goes to the others as they stand.
+    fn unlearn(&self, policy: &Distribution, gradient: &mut [f32; Action::COUNT]) {
+        let taken = self.action.index();
+        let others: f32 =
+            (0..Action::COUNT).filter(|&other| other != taken).map(|a| policy.probability[a]).sum();
+        if self.lost <= 0.0 || others <= 0.0 {
+            return;
+        }
+        let push = UNLIKELIHOOD * self.lost * policy.probability[taken];
+        for (action, gradient) in gradient.iter_mut().enumerate() {
+            *gradient += if action == taken { push } else { -push * policy.probability[action] / others };
+        }
     }
 }
 

@@ -110,7 +110,6 @@ fn card_text(
     writeln!(text, "| SHA-256 of the content | `{}` |", policy.info().sha256)?;
     writeln!(text, "| parameters | {} |", policy.info().parameters)?;
     writeln!(text, "| schema hash | `{:#018x}` |", policy.info().schema_hash)?;
-    writeln!(text, "| trained with | `{}` |", card.command)?;
     writeln!(text, "| commit | `{}` |", card.commit)?;
     writeln!(text, "| seed | {} |", card.seed)?;
     writeln!(
@@ -122,6 +121,8 @@ fn card_text(
     writeln!(text, "| trained in | {} |", card.scenario)?;
     writeln!(text, "| city hash | `{:#018x}` |", card.city_hash)?;
     writeln!(text, "| golden pairs | {}, in the file |", policy.goldens().len())?;
+    let steps = card.command.replace(" && ", "\n");
+    writeln!(text, "\nTrained with, each from what the one before had left:\n\n```text\n{steps}\n```")?;
     writeln!(
         text,
         "\nMeasured on {} evaluation realizations that were neither trained on nor used to choose parameters, in \

@@ -9,6 +9,7 @@ use gleaner_host_trainer::paper::Setting;
 use gleaner_host_trainer::parts::{Parts, Source};
 use gleaner_host_trainer::report::{self, Detail, OracleSetting, Report};
 use gleaner_host_trainer::robustness::{repeat_flights, world_with};
+use gleaner_host_trainer::system::System as Learner;
 use gleaner_policy::Preference;
 use gleaner_world::{Fading, Realization, ScenarioKind, Seed, World};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -19,13 +20,16 @@ use std::io::{BufRead, BufReader, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The model that is reported on when none is named.
+/// What is reported on when nothing is named: the model, a folder for each of the paper's systems, and the oracle.
 const SHIPPED: &str = "models/gleaner.onnx";
+const SHIPPED_RUNS: &str = "models/paper";
+const SHIPPED_ORACLE: &str = "models/oracle.jsonl";
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// An ONNX model, flown by the engine that flies it on board; NAME=FILE gives it a name. Repeatable. The first
-    /// system of all is looked at more closely: fading, attention, trajectories.
+    /// system of all is looked at more closely: fading, attention, trajectories. Without any --model and --run: all
+    /// that is shipped in models/.
     #[arg(long, value_name = "[NAME=]FILE")]
     model: Vec<String>,
     /// The folder of a run: its best parameters, flown by the learner's network, and its learning curve; NAME=FOLDER
@@ -35,7 +39,7 @@ pub struct Arguments {
     /// The folder of a run of which only the learning curve is shown, such as the one that made a model. Repeatable.
     #[arg(long, value_name = "[NAME=]FOLDER")]
     curve: Vec<String>,
-    /// What `gleaner-train oracle` wrote: the oracle and the bound for every table.
+    /// What `gleaner-train oracle` wrote: the oracle for every table. The default is the shipped one.
     #[arg(long, value_name = "FILE")]
     oracle: Option<PathBuf>,
     /// Folder of the page, the CSV files and the finished parts.
@@ -56,9 +60,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
         bail!("--realizations 0: nothing to fly; give at least 1");
     }
-    let mut systems = named_systems(arguments)?;
-    let oracle = arguments.oracle.as_deref().map(read_oracle).transpose()?.unwrap_or_default();
-    let curves = named_curves(arguments)?;
+    let chosen = Chosen::by(arguments);
+    let mut systems = chosen.systems()?;
+    let oracle = chosen.oracle.as_deref().map(read_oracle).transpose()?.unwrap_or_default();
+    let curves = chosen.curves()?;
     let desk = Desk::open(arguments, systems.len())?;
     let mut shown = vec![desk.greedy()?];
     for system in &mut systems {
@@ -243,53 +248,81 @@ fn name(setting: Setting) -> String {
     format!("{}, K = {}, B = {}", setting.scenario_name(), setting.devices, setting.battery)
 }
 
-/// The systems that the arguments name, with a name each.
-fn named_systems(arguments: &Arguments) -> Result<Vec<System>> {
-    let shipped = [SHIPPED.to_owned()];
-    let nothing_named = arguments.model.is_empty() && arguments.run.is_empty();
-    let models = if nothing_named { &shipped[..] } else { &arguments.model[..] };
-    let mut systems = Vec::new();
-    for model in models {
-        let (name, path) = named(model);
-        systems.push(System::model(name, Path::new(path))?);
-    }
-    for run in &arguments.run {
-        let (name, folder) = named(run);
-        systems.push(System::run(name, Path::new(folder))?);
-    }
-    for index in 0..systems.len() {
-        let twins = systems[..index].iter().filter(|other| other.name == systems[index].name).count();
-        if twins > 0 {
-            bail!("two systems are called {}; tell them apart with --model NAME=FILE", systems[index].name);
-        }
-    }
-    Ok(systems)
+/// A name, if it was given one, and where it lies.
+type Named = (Option<String>, PathBuf);
+
+/// What is reported on.
+struct Chosen {
+    models: Vec<Named>,
+    runs: Vec<Named>,
+    curves: Vec<Named>,
+    oracle: Option<PathBuf>,
 }
 
-fn named_curves(arguments: &Arguments) -> Result<Vec<(String, Vec<curves::Point>)>> {
-    let mut all = Vec::new();
-    for run in arguments.run.iter().chain(&arguments.curve) {
-        let (name, folder) = named(run);
-        let folder = Path::new(folder);
-        if !folder.is_dir() {
-            bail!("{}: no such folder; check --run and --curve", folder.display());
+impl Chosen {
+    fn by(arguments: &Arguments) -> Chosen {
+        let named = |list: &[String]| list.iter().map(|argument| named(argument)).collect();
+        let mut chosen = Chosen {
+            models: named(&arguments.model),
+            runs: named(&arguments.run),
+            curves: named(&arguments.curve),
+            oracle: arguments.oracle.clone(),
+        };
+        if chosen.models.is_empty() && chosen.runs.is_empty() {
+            let runs = Learner::ALL
+                .map(|system| (Some(system.title().to_owned()), Path::new(SHIPPED_RUNS).join(system.name())));
+            chosen.models.push((None, SHIPPED.into()));
+            chosen.runs.extend(runs.into_iter().filter(|(_, folder)| folder.is_dir()));
         }
-        let fallback = folder.file_name().unwrap_or(folder.as_os_str()).display().to_string();
-        let points = curves::read(folder)?;
-        if points.is_empty() && arguments.curve.contains(run) {
-            bail!(
-                "{}: no learning curve here yet; wait for its first line or check --curve",
-                folder.display()
-            );
-        }
-        all.push((name.map_or(fallback, str::to_owned), points));
+        let shipped = Path::new(SHIPPED_ORACLE);
+        chosen.oracle = chosen.oracle.or_else(|| shipped.exists().then(|| shipped.into()));
+        chosen
     }
-    Ok(all)
+
+    fn systems(&self) -> Result<Vec<System>> {
+        let mut systems = Vec::new();
+        for (name, path) in &self.models {
+            systems.push(System::model(name.as_deref(), path)?);
+        }
+        for (name, folder) in &self.runs {
+            systems.push(System::run(name.as_deref(), folder)?);
+        }
+        for (index, system) in systems.iter().enumerate() {
+            if systems[..index].iter().any(|other| other.name == system.name) {
+                bail!("two systems are called {}; tell them apart with --model NAME=FILE", system.name);
+            }
+        }
+        Ok(systems)
+    }
+
+    /// The learning curves; a run may have none yet, what was asked for its curve may not.
+    fn curves(&self) -> Result<Vec<(String, Vec<curves::Point>)>> {
+        let of = |(name, folder): &Named| -> Result<(String, Vec<curves::Point>)> {
+            if !folder.is_dir() {
+                bail!("{}: no such folder; check --run and --curve", folder.display());
+            }
+            let fallback = || folder.file_name().unwrap_or(folder.as_os_str()).display().to_string();
+            Ok((name.clone().unwrap_or_else(fallback), curves::read(folder)?))
+        };
+        let mut all = self.runs.iter().map(of).collect::<Result<Vec<_>>>()?;
+        for named in &self.curves {
+            let curve = of(named)?;
+            if curve.1.is_empty() {
+                let folder = named.1.display();
+                bail!("{folder}: no learning curve here yet; wait for its first line or check --curve");
+            }
+            all.push(curve);
+        }
+        Ok(all)
+    }
 }
 
 /// `NAME=PATH`, or a path alone.
-fn named(argument: &str) -> (Option<&str>, &str) {
-    argument.split_once('=').map_or((None, argument), |(name, path)| (Some(name), path))
+fn named(argument: &str) -> Named {
+    match argument.split_once('=') {
+        Some((name, path)) => (Some(name.to_owned()), path.into()),
+        None => (None, argument.into()),
+    }
 }
 
 fn read_oracle(path: &Path) -> Result<Vec<OracleSetting>> {
