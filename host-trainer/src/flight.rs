@@ -3,8 +3,8 @@
 use crate::observation::Observation;
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
-use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet, Metres};
-use gleaner_world::{City, Episode, Realization, ScenarioError, Seed, Stream, World};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
+use gleaner_world::{Episode, Realization, ScenarioError, Seed, Stream, World};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
@@ -89,7 +89,6 @@ impl Flight {
             spare: self.spare(),
             terminal: self.episode.terminal(),
             preference: self.preference,
-            altitude: Metres(f32::from(City::ALTITUDE_M)),
             sight: self.episode.world().city(),
         };
         let devices = self.episode.devices().iter().enumerate().map(|(index, device)| {

@@ -119,7 +119,6 @@ mod tests {
                     spare: BatteryUnits(20.0),
                     terminal: mirror.cell(grid, Cell::new(30, 18)),
                     preference: Preference::DATA,
-                    altitude: Metres(60.0),
                     sight: city,
                 };
                 let devices = (0..6_u8).map(|index| DeviceState {

@@ -11,8 +11,9 @@
 //! look some slots ahead (Schulman et al. 2016).
 //!
 //! What a policy is sure of it never tries otherwise, and the critic expects the loss: where it is wrong and sure, policy
-//! gradients are blind. But the planner has seen what the slot lost. So each loss that is more than noise also makes
-//! the action itself less likely (unlikelihood, Welleck et al. 2020), the more the surer the policy was.
+//! gradients are blind. So policies kept flying over their base by accident, which ends a mission. The planner has
+//! seen what that move lost: it makes the move itself less likely, the more the surer the policy was (unlikelihood,
+//! Welleck et al. 2020).
 //!
 //! Each mission is seen in one of the eight views, turned or mirrored, so that nothing is learned of north alone.
 
@@ -64,10 +65,10 @@ const PREFERENCE_BINS: usize = 11;
 const SPREAD_MIN: f32 = 0.3;
 /// Advantages beyond this many deviations count as this much: one lost mission must not turn the policy over.
 const ADVANTAGE_MAX: f32 = 8.0;
-/// Losses up to this are noise of the planner and of the channel, utility.
+/// A move that ends the mission is a mistake if it loses more than the planner and the channel are uncertain by, utility.
 const NOISE: f32 = 0.5;
 /// Weight of the unlikelihood, in standard deviations of the advantage.
-const UNLIKELIHOOD: f32 = 1.0;
+const UNLIKELIHOOD: f32 = 4.0;
 /// The longest gradient that is followed.
 const GRADIENT_MAX: f32 = 0.5;
 /// Share of the actor that its running average takes over per update.
@@ -440,7 +441,7 @@ struct Lesson {
     advantage: f32,
     /// What was gained from here on: the critic's target.
     gained: f32,
-    /// What the slot alone lost beyond the noise, in the unit of the advantage.
+    /// What the move lost by ending the mission too early, in the unit of the advantage.
     lost: f32,
 }
 
@@ -460,7 +461,7 @@ fn judge(experiences: Vec<Experience>, ahead: f32) -> Vec<Lesson> {
             log_probability: experience.log_probability,
             advantage,
             gained: advantage + experience.value,
-            lost: (-experience.gain - NOISE).max(0.0),
+            lost: if experience.over { (-experience.gain - NOISE).max(0.0) } else { 0.0 },
         });
         (next_value, next_advantage) = (experience.value, advantage);
     }

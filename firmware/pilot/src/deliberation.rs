@@ -62,7 +62,6 @@ impl Deliberation<'_> {
             spare,
             terminal: self.mission.terminal,
             preference: self.preference,
-            altitude: self.altitude,
             sight: &sight,
         };
         let (tokens, slots) = Tokens::build(&situation, self.devices.iter().copied());

@@ -1,6 +1,6 @@
 //! What the aircraft knows when it decides.
 
-use gleaner_units::{BatteryUnits, Cell, Db, Metres, Sight};
+use gleaner_units::{BatteryUnits, Cell, Db, Sight};
 use serde::{Deserialize, Serialize};
 
 /// How much data is worth against energy: `w_data` in 0..=1, energy gets the rest (paper, vector w).
@@ -58,8 +58,6 @@ pub struct Situation<'a> {
     pub terminal: Cell,
     /// The operator's preference.
     pub preference: Preference,
-    /// Flight altitude above the devices.
-    pub altitude: Metres,
-    /// The city: who is seen from where.
+    /// The city from flight altitude: who is seen from where.
     pub sight: &'a dyn Sight,
 }

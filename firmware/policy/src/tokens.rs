@@ -57,13 +57,13 @@ impl Tokens {
             devices: Vec::new(),
         };
         let mut slots = Slots::new();
-        let mut yields = YieldMap::new(situation.sight, situation.cell, situation.altitude);
+        let mut yields = YieldMap::new(situation.sight, situation.cell);
         for (index, device) in (0..=u16::MAX).zip(devices) {
             yields.add(&device);
             let [east_m, north_m] = offset_m(device.cell);
             let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
             let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
-            let vantage = vantage(situation.sight, situation.altitude, device.cell, situation.cell);
+            let vantage = vantage(situation.sight, device.cell, situation.cell);
             let [vantage_east_m, vantage_north_m] = vantage.map(|cells| cells * cell_m);
             let token = [
                 east_m,
@@ -133,7 +133,6 @@ mod tests {
             spare: BatteryUnits(48.0),
             terminal: Cell::new(30, 18),
             preference: Preference::new(0.25).unwrap(),
-            altitude: Metres(60.0),
             sight,
         }
     }

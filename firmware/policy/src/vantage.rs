@@ -5,7 +5,7 @@
 //! enough to send fast. Where that is, and how many moves away, is what a mission is planned by.
 
 use crate::yields::units_per_slot;
-use gleaner_units::{Cell, Metres, Sight};
+use gleaner_units::{Cell, Sight};
 
 /// Data units that a slot at a vantage carries, at least.
 const FAST_UNITS: f32 = 400.0;
@@ -18,10 +18,10 @@ const REACH: i16 = 7;
 ///
 /// # Cost
 /// At most one ray for each of the 149 cells around the device, only for those that are nearer than the best so far.
-pub(crate) fn vantage(sight: &dyn Sight, altitude: Metres, device: Cell, from: Cell) -> [f32; 2] {
+pub(crate) fn vantage(sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;
-    let height_m2 = altitude.0 * altitude.0;
+    let height_m2 = sight.altitude().0 * sight.altitude().0;
     let mut best = (i32::MAX, i32::MAX);
     let (mut sum, mut count) = ([0_i32; 2], 0_i32);
     for north in -REACH..=REACH {
@@ -53,7 +53,7 @@ pub(crate) fn vantage(sight: &dyn Sight, altitude: Metres, device: Cell, from: C
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_units::{Grid, HeightMap, Rays};
+    use gleaner_units::{Grid, HeightMap, Metres, Rays};
 
     fn flat() -> HeightMap {
         HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap())
@@ -61,7 +61,7 @@ mod tests {
 
     fn seen(heights: &HeightMap, device: (i16, i16), from: (i16, i16)) -> [f32; 2] {
         let rays = Rays { heights, altitude_m: 60 };
-        vantage(&rays, Metres(60.0), Cell::new(device.0, device.1), Cell::new(from.0, from.1))
+        vantage(&rays, Cell::new(device.0, device.1), Cell::new(from.0, from.1))
     }
 
     #[test]
@@ -88,9 +88,10 @@ mod tests {
 
     #[test]
     fn no_vantage_at_all_is_the_device() {
-        let rays = Rays { heights: &flat(), altitude_m: 200 };
-        assert_eq!(vantage(&rays, Metres(200.0), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
+        let heights = flat();
+        let rays = |altitude_m| Rays { heights: &heights, altitude_m };
+        assert_eq!(vantage(&rays(200), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
         let beyond = Cell::new(i16::MAX, i16::MIN);
-        assert_eq!(vantage(&rays, Metres(60.0), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
+        assert_eq!(vantage(&rays(60), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
     }
 }

@@ -14,7 +14,7 @@
 
 use crate::schema::{TERMINAL_UNITS, YIELD_STEP_UNITS};
 use crate::{DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
-use gleaner_units::{Cell, Metres, Sight};
+use gleaner_units::{Cell, Sight};
 use heapless::Vec;
 
 /// How far the map reaches, cells.
@@ -56,14 +56,13 @@ pub(crate) fn units_per_slot(distance_m2: f32) -> f32 {
 pub(crate) struct YieldMap<'a> {
     sight: &'a dyn Sight,
     center: Cell,
-    altitude: Metres,
     /// Data units by north and east offset, the south-west corner first.
     units: [[u16; WINDOW]; WINDOW],
 }
 
 impl<'a> YieldMap<'a> {
-    pub(crate) const fn new(sight: &'a dyn Sight, center: Cell, altitude: Metres) -> YieldMap<'a> {
-        YieldMap { sight, center, altitude, units: [[0; WINDOW]; WINDOW] }
+    pub(crate) const fn new(sight: &'a dyn Sight, center: Cell) -> YieldMap<'a> {
+        YieldMap { sight, center, units: [[0; WINDOW]; WINDOW] }
     }
 
     /// Adds what one device would send.
@@ -76,13 +75,14 @@ impl<'a> YieldMap<'a> {
         }
         let grid = self.sight.grid();
         let cell_m2 = grid.cell().0 * grid.cell().0;
+        let height_m2 = self.sight.altitude().0 * self.sight.altitude().0;
         let square_m2 = |offset: i16, aircraft: i16, device: i16| {
             let cells = f32::from(offset) + (f32::from(aircraft) - f32::from(device));
             cells * cells * cell_m2
         };
         let Cell { x, y } = self.center;
         for (line, north) in self.units.iter_mut().zip(-REACH..) {
-            let row_m2 = square_m2(north, y, device.cell.y) + self.altitude.0 * self.altitude.0;
+            let row_m2 = square_m2(north, y, device.cell.y) + height_m2;
             if row_m2 >= RANGE_M2 {
                 continue;
             }
@@ -126,7 +126,7 @@ impl<'a> YieldMap<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_units::{Grid, HeightMap, Rays};
+    use gleaner_units::{Grid, HeightMap, Metres, Rays};
 
     fn device(x: i16, y: i16, remaining: f32) -> DeviceState {
         DeviceState { cell: Cell::new(x, y), remaining, snr: None }
@@ -134,7 +134,7 @@ mod tests {
 
     fn map(heights: &HeightMap, devices: &[DeviceState]) -> std::vec::Vec<f32> {
         let rays = Rays { heights, altitude_m: 60 };
-        let mut map = YieldMap::new(&rays, Cell::new(20, 15), Metres(60.0));
+        let mut map = YieldMap::new(&rays, Cell::new(20, 15));
         devices.iter().for_each(|device| map.add(device));
         map.patches(Cell::new(0, 0)).to_vec()
     }
@@ -202,7 +202,7 @@ mod tests {
         assert!(at(&map, 3, 4) > 0.0, "west of the wall");
         assert_eq!(at(&map, 6, 4), 0.0, "behind the wall");
         let rays = Rays { heights: &heights, altitude_m: 60 };
-        let mut corner = YieldMap::new(&rays, Cell::new(0, 0), Metres(60.0));
+        let mut corner = YieldMap::new(&rays, Cell::new(0, 0));
         corner.add(&device(0, 0, 8000.0));
         let patches = corner.patches(Cell::new(30, 18));
         assert!(patches[..4 * LOCAL_MAP_SIDE].iter().all(|&units| units == 0.0));
@@ -212,7 +212,7 @@ mod tests {
     fn the_terminal_is_marked_where_one_move_or_two_would_end_the_mission() {
         let flat = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
         let rays = Rays { heights: &flat, altitude_m: 60 };
-        let map = YieldMap::new(&rays, Cell::new(20, 15), Metres(60.0));
+        let map = YieldMap::new(&rays, Cell::new(20, 15));
         for (terminal, mark) in [
             ((20, 16), Some((4, 5))),
             ((19, 15), Some((3, 4))),

@@ -1,11 +1,14 @@
 //! Line of sight from the ground to flight altitude, decided in whole numbers.
 
-use crate::{Cell, Grid, HeightMap};
+use crate::{Cell, Grid, HeightMap, Metres};
 
 /// Who on the ground sees whom in the air.
 pub trait Sight {
     /// The cells that it knows of.
     fn grid(&self) -> Grid;
+
+    /// How high above the ground they fly.
+    fn altitude(&self) -> Metres;
 
     /// Whether a device on the ground at the centre of `ground` and an aircraft at the centre of `air` see each other.
     fn sees(&self, ground: Cell, air: Cell) -> bool;
@@ -23,6 +26,10 @@ pub struct Rays<'a> {
 impl Sight for Rays<'_> {
     fn grid(&self) -> Grid {
         self.heights.grid()
+    }
+
+    fn altitude(&self) -> Metres {
+        Metres(f32::from(self.altitude_m))
     }
 
     fn sees(&self, ground: Cell, air: Cell) -> bool {
@@ -76,7 +83,6 @@ fn ray_is_clear(heights: &HeightMap, altitude_m: u16, device: Cell, uav: Cell) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Metres;
     use std::format;
 
     fn city(rows: &str) -> HeightMap {

@@ -3,7 +3,7 @@
 use crate::autopilot::Truth;
 use gleaner_pilot::{DecisionRecord, Mission};
 use gleaner_policy::{DeviceState, Preference, Situation, Slots, Tokens};
-use gleaner_units::{Duration, Instant, Metres, Ned, Rays};
+use gleaner_units::{Duration, Instant, Ned, Rays};
 use gleaner_world::{City, Serving};
 use serde::Serialize;
 use std::io::{self, Write};
@@ -29,8 +29,8 @@ pub struct Slot {
 
 impl Slot {
     /// The observation that the pilot must have had: what it says of cell, battery and preference, what the radio
-    /// reported, and the mission, flown at the altitude of the simulated city. `None` if its preference is impossible. So a decision that was made elsewhere can be
-    /// made again here, and no pilot is asked what it saw.
+    /// reported, and the mission, flown at the altitude of the simulated city. `None` if its preference is
+    /// impossible. So a decision that was made elsewhere can be made again here, and no pilot is asked what it saw.
     #[must_use]
     pub fn observation(&self, mission: &Mission) -> Option<(Tokens, Slots)> {
         let sight = Rays { heights: &mission.heights, altitude_m: City::ALTITUDE_M };
@@ -40,7 +40,6 @@ impl Slot {
             spare: self.record.spare,
             terminal: mission.terminal,
             preference: Preference::new(self.record.w_data)?,
-            altitude: Metres(f32::from(City::ALTITUDE_M)),
             sight: &sight,
         };
         Some(Tokens::build(&situation, self.heard.iter().copied()))

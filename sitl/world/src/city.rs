@@ -174,6 +174,10 @@ impl Sight for City {
         City::grid(self)
     }
 
+    fn altitude(&self) -> Metres {
+        Metres(f32::from(City::ALTITUDE_M))
+    }
+
     fn sees(&self, ground: Cell, air: Cell) -> bool {
         self.line_of_sight(ground, air)
     }
