@@ -98,7 +98,7 @@ pub fn normalise(tokens: &Tokens) -> Sample {
 mod tests {
     use super::*;
     use gleaner_policy::{DeviceState, Situation, View};
-    use gleaner_units::{Action, BatteryUnits, Cell, Db, Metres};
+    use gleaner_units::{Action, BatteryUnits, Cell, Db};
     use gleaner_world::{City, Mirror};
 
     /// What the builder makes of a mirrored city is the view of what it makes of the city.

@@ -94,7 +94,7 @@ fn tiny() -> ModelProto {
             node("Reshape", &["looks", "square"], "attention", vec![]),
         ],
         initializer: vec![
-            integers("flat", &[-1, 60]),
+            integers("flat", &[-1, 84]),
             integers("square", &[-1, TOKENS as i64, TOKENS as i64]),
             floats("weight", &[5, WIDTH], (0..5 * WIDTH).map(|at| weight(at / WIDTH, at % WIDTH))),
             floats("bias", &[5], [0.0; 5].into_iter()),

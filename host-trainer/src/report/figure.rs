@@ -21,7 +21,9 @@ pub(super) fn systems_legend(report: &Report, with_references: bool) -> Markup {
         entries.push((csv::ORACLE.into(), ORACLE));
     }
     if with_references {
-        entries.push((table::BOUND.into(), BOUND));
+        if report.is_bounded() {
+            entries.push((table::BOUND.into(), BOUND));
+        }
         entries.push((format!("{}, MOSAC-ATT", table::PAPER), PAPER));
     }
     html! {

@@ -122,6 +122,12 @@ impl Report {
         self.oracle.iter().rev().find(|oracle| oracle.is_of(setting))
     }
 
+    /// Whether anything was proven of what is possible.
+    #[must_use]
+    pub fn is_bounded(&self) -> bool {
+        self.oracle.iter().any(|oracle| !oracle.upper_bound_percent.is_empty())
+    }
+
     /// Whether the oracle flew the same realizations as the systems: means over others do not compare.
     #[must_use]
     pub fn compares(&self, setting: Setting) -> bool {

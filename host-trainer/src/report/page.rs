@@ -123,8 +123,11 @@ fn main_section(report: &Report) -> Markup {
                 "Hypervolume is the area above (\u{2212}1, \u{2212}200) that the eleven preferences dominate: of the front of "
                 "their means, and as the mean over single realizations. The oracle knows map, channel and devices; its "
                 "numbers are what the best tour that it found brings in the mean of the channel. It is a strong search, "
-                "not a proof. No system can pass the proven bound: it is computed for the data, it is the shortest "
-                "mission for the energy, and the bounds of utility and hypervolume follow from those two, loosely."
+                "not a proof."
+                @if report.is_bounded() {
+                    " No system can pass the proven bound: it is computed for the data, it is the shortest mission for "
+                    "the energy, and the bounds of utility and hypervolume follow from those two, loosely."
+                }
             }
         },
     )
@@ -252,7 +255,7 @@ fn fading_section(detail: &Detail) -> Markup {
                     (repeats) " times with other draws of the channel; mean and standard deviation of the "
                     (repeats) " means. With fading, every link gains 20 log10 |h| dB, |h| Rayleigh-distributed with scale "
                     "1. Policies are trained without. The paper does not say which scenario its table is of; its level is "
-                    "RD's. Oracle and proven bound were not computed under fading. From " code { "fading.csv" } "."
+                    "RD's. The oracle was not computed under fading. From " code { "fading.csv" } "."
                 }
             }
         },

@@ -177,9 +177,11 @@ pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
                         @match &oracle { Some(table) => (cell(metric, table, None, false)), None => (missing()) }
                     }
                 }
-                tr.reference {
-                    th scope="row" { (BOUND) }
-                    @for metric in Metric::ALL { (limit_cell(metric, setting, limits)) }
+                @if report.is_bounded() {
+                    tr.reference {
+                        th scope="row" { (BOUND) }
+                        @for metric in Metric::ALL { (limit_cell(metric, setting, limits)) }
+                    }
                 }
             }
             } }
@@ -202,7 +204,7 @@ pub(super) fn metric_table(report: &Report, metric: Metric) -> Markup {
                 th scope="col" { (PAPER) span.unit { "MOSAC-ATT" } }
                 @for system in &report.systems { th scope="col" { (system.name) } }
                 th scope="col" { (ORACLE) }
-                th scope="col" { (BOUND) }
+                @if report.is_bounded() { th scope="col" { (BOUND) } }
             } }
             tbody { @for setting in Setting::ALL { (metric_row(report, metric, setting)) } }
             } }
@@ -230,7 +232,7 @@ fn metric_row(report: &Report, metric: Metric, setting: Setting) -> Markup {
                 }
             }
             @match &oracle { Some(table) => (cell(metric, table, None, false)), None => (missing()) }
-            (limit_cell(metric, setting, report.limits(setting)))
+            @if report.is_bounded() { (limit_cell(metric, setting, report.limits(setting))) }
         }
     }
 }
@@ -249,11 +251,14 @@ fn best_of<'a>(metric: Metric, tables: impl Iterator<Item = &'a Table>) -> Optio
 /// How much of the bound was computed, in words.
 fn bounded(report: &Report, setting: Setting) -> String {
     match report.oracle(setting) {
-        None => format!("{ORACLE} and {BOUND} were not computed for this report."),
+        None => format!("{ORACLE} was not computed for this report."),
         Some(oracle) => {
             let flown = oracle.missions.realizations();
             let bounded = oracle.upper_bound_percent.len();
             let oracle = format!("{ORACLE}: {flown} realizations");
+            if !report.is_bounded() {
+                return oracle + ".";
+            }
             let bound = if bounded == 0 { "not computed".into() } else { format!("{bounded} realizations") };
             format!("{oracle}; {BOUND} of the data: {bound}.")
         }
