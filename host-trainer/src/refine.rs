@@ -68,7 +68,7 @@ const ADVANTAGE_MAX: f32 = 8.0;
 /// A move that ends the mission is a mistake if it loses more than the planner and the channel are uncertain by, utility.
 const NOISE: f32 = 0.5;
 /// Weight of the unlikelihood, in standard deviations of the advantage.
-const UNLIKELIHOOD: f32 = 4.0;
+const UNLIKELIHOOD: f32 = 1.0;
 /// The longest gradient that is followed.
 const GRADIENT_MAX: f32 = 0.5;
 /// Share of the actor that its running average takes over per update.
