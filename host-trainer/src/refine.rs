@@ -538,3 +538,61 @@ fn confident(actor: &[f32], confidence: f32) -> Vec<f32> {
     }
     actor
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mistake(action: Action, lost: f32) -> Lesson {
+        Lesson {
+            sample: Sample::default(),
+            mask: ActionMask::FULL,
+            action,
+            log_probability: 0.0,
+            advantage: 0.0,
+            gained: 0.0,
+            lost,
+        }
+    }
+
+    #[test]
+    fn unlearning_follows_the_slope_of_its_loss_and_does_not_vanish_where_the_policy_is_sure() {
+        let lesson = mistake(Action::East, 3.0);
+        let mask = ActionMask::FULL;
+        let loss = |logits: &[f32; Action::COUNT]| {
+            let p = Distribution::new(logits, mask).probability[Action::East.index()];
+            -f64::from(UNLIKELIHOOD * 3.0) * (1.0 - f64::from(p)).ln()
+        };
+        let logits = [0.3, -0.5, 1.0, 0.1, 0.9];
+        let mut gradient = [0.0; Action::COUNT];
+        lesson.unlearn(&Distribution::new(&logits, mask), &mut gradient);
+        for index in 0..Action::COUNT {
+            let shifted = |by: f32| {
+                let mut logits = logits;
+                logits[index] += by;
+                loss(&logits)
+            };
+            let measured = (shifted(1e-2) - shifted(-1e-2)) / 2e-2;
+            assert!(
+                (measured - f64::from(gradient[index])).abs() < 1e-3,
+                "{index}: {measured}, {gradient:?}"
+            );
+        }
+        let mut sure = [0.0; Action::COUNT];
+        sure[Action::East.index()] = 12.0;
+        let mut gradient = [0.0; Action::COUNT];
+        lesson.unlearn(&Distribution::new(&sure, mask), &mut gradient);
+        assert!(gradient[Action::East.index()] > 2.99 * UNLIKELIHOOD, "{gradient:?}");
+        assert!(gradient.iter().sum::<f32>().abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_move_without_alternative_and_one_without_loss_teach_nothing() {
+        let mut gradient = [0.0; Action::COUNT];
+        let forced = Distribution::new(&[0.0; Action::COUNT], ActionMask::EMPTY.with(Action::North));
+        mistake(Action::North, 5.0).unlearn(&forced, &mut gradient);
+        mistake(Action::North, 0.0)
+            .unlearn(&Distribution::new(&[0.0; Action::COUNT], ActionMask::FULL), &mut gradient);
+        assert_eq!(gradient, [0.0; Action::COUNT]);
+    }
+}

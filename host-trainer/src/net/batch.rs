@@ -34,6 +34,7 @@ impl Sample {
         let mut seen = *self;
         seen.uav[2..].copy_from_slice(&view.offset([self.uav[2], self.uav[3]]));
         for device in &mut seen.devices {
+            // The device and its vantage.
             for [first, second] in [[0, 1], [5, 6]] {
                 [device[first], device[second]] = view.offset([device[first], device[second]]);
             }
