@@ -212,7 +212,8 @@ fn every_decision_is_logged_whole() {
     // Spare battery, battery, terminal 2 cells east and 2 north.
     assert_eq!(first["tokens"]["uav"], serde_json::json!([16.0, 20.0, 40.0, 40.0]));
     assert_eq!(first["tokens"]["local_map"].as_array().unwrap().len(), LOCAL_MAP_CELLS);
-    assert_eq!(first["tokens"]["devices"], serde_json::json!([[20.0, 20.0, 6000.0, -34.0, 0.0]]));
+    // One cell east and one north; a building hides it from the cell to the north, so the vantage is the one to the east.
+    assert_eq!(first["tokens"]["devices"], serde_json::json!([[20.0, 20.0, 6000.0, -34.0, 0.0, 20.0, 0.0]]));
     assert_eq!(first["slots"], serde_json::json!([0]));
     assert!(first["infer_us"].is_u64() && first["run_s"].is_u64() && first["time_us"].is_u64(), "{first}");
 }
