@@ -140,10 +140,20 @@ fn printed(settings: &[Setting], metric: Metric) -> Vec<Spot> {
     settings.iter().enumerate().filter_map(of_one).collect()
 }
 
+/// A run looks as its system does in the other figures; one that is only a curve looks like none of them.
+fn curve_look(report: &Report, place: usize, name: &str) -> Look {
+    let system = report.systems.iter().position(|system| system.name == name);
+    look(system.unwrap_or(report.systems.len() + place))
+}
+
 /// The runs of the learning curves.
 pub(super) fn curves_legend(report: &Report) -> Markup {
-    let entries: Vec<(String, Look)> =
-        report.curves.iter().enumerate().map(|(place, (name, _))| (name.clone(), look(place + 1))).collect();
+    let entries: Vec<(String, Look)> = report
+        .curves
+        .iter()
+        .enumerate()
+        .map(|(place, (name, _))| (name.clone(), curve_look(report, place, name)))
+        .collect();
     legend(&entries)
 }
 
@@ -166,7 +176,7 @@ pub(super) fn curves(report: &Report, kind: ScenarioKind) -> Markup {
             let spots: Vec<Spot> = told.collect();
             // Marks tell runs apart while there are few of them.
             let joined = if spots.len() > 40 { Joined::LineWithoutMarks } else { Joined::Line };
-            Series { look: look(place + 1), spots, joined }
+            Series { look: curve_look(report, place, name), spots, joined }
         })
         .collect();
     let spots = || series.iter().flat_map(|one| &one.spots);
