@@ -4,9 +4,9 @@ use crate::flight::Flight;
 use crate::net::{
     Architecture, Batch, Shape, VECTOR_DEVICE_FEATURES, VECTOR_FEATURES, VectorBatch, VectorShape,
 };
-use crate::observation::Observation;
+use crate::observation::{Observation, way_to_terminal};
 use crate::system::System;
-use gleaner_policy::{Preference, schema};
+use gleaner_policy::Preference;
 use gleaner_world::World;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -111,7 +111,7 @@ impl Encoding for FeatureVector {
     }
 
     fn way_to_terminal(seen: &Features) -> f32 {
-        (seen.0[1] - seen.0[0]) * schema::BATTERY.scale
+        way_to_terminal(seen.0[0], seen.0[1])
     }
 }
 

@@ -64,7 +64,7 @@ impl Observation {
     /// Moves to the terminal: battery minus spare battery.
     #[must_use]
     pub fn way_to_terminal(&self) -> f32 {
-        (self.uav[1] - self.uav[0]) * schema::BATTERY.scale
+        way_to_terminal(self.uav[0], self.uav[1])
     }
 
     /// The network's input for this state under a preference.
@@ -84,6 +84,11 @@ impl Observation {
         sample.devices[..self.devices.len()].copy_from_slice(&self.devices);
         sample
     }
+}
+
+/// Moves to the terminal, from the normalised spare battery and battery.
+pub(crate) fn way_to_terminal(spare: f32, battery: f32) -> f32 {
+    (battery - spare) * schema::BATTERY.scale
 }
 
 /// The network's input for these tokens.

@@ -7,8 +7,9 @@ use crate::encoding::{Encoding, weights};
 use crate::flight::Flight;
 use crate::maps::{height, local_cell};
 use crate::net::{Batch, LOCAL_SIDE, Shape, VECTOR_DEVICE_FEATURES};
+use crate::observation::way_to_terminal;
 use crate::system::System;
-use gleaner_policy::{Preference, schema};
+use gleaner_policy::Preference;
 use gleaner_units::{Cell, HeightMap};
 use gleaner_world::World;
 use serde::{Deserialize, Serialize};
@@ -58,7 +59,7 @@ impl Encoding for PaperTokens {
     }
 
     fn way_to_terminal(seen: &Seen) -> f32 {
-        (seen.uav[1] - seen.uav[0]) * schema::BATTERY.scale
+        way_to_terminal(seen.uav[0], seen.uav[1])
     }
 }
 

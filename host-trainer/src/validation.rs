@@ -84,7 +84,7 @@ impl Validation {
         self.tables(world, &mut Network::new(Shape::actor(), actor))
     }
 
-    /// Judges a MOSAC-ATT policy, gives it its score and offers it to `best`.
+    /// Judges a policy that could fly, gives it its score and offers it to `best`.
     ///
     /// # Errors
     /// Those of [`Validation::judge`].

@@ -17,7 +17,7 @@ const REACH: i16 = 7;
 /// Without one, the device itself.
 ///
 /// # Cost
-/// At most one ray for each of the 149 cells around the device, only for those that are nearer than the best so far.
+/// At most one ray for each of the 149 cells around the device, only for those that are as near as the best so far.
 pub(crate) fn vantage(sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;
