@@ -98,7 +98,7 @@ impl Encoding for FeatureVector {
     }
 
     fn observe(&self, flight: &Flight) -> Features {
-        let sample = flight.observe().with(flight.preference());
+        let sample = flight.sample();
         let devices = sample.devices_present().iter().flat_map(|device| &device[..VECTOR_DEVICE_FEATURES]);
         Features(sample.uav.iter().chain(devices).copied().collect())
     }

@@ -1,6 +1,7 @@
 //! A mission on the grid with the guard on: what the learner flies.
 
-use crate::observation::Observation;
+use crate::net::Sample;
+use crate::observation::{Observation, normalise};
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
@@ -99,6 +100,12 @@ impl Flight {
             DeviceState { cell: device.cell, remaining, snr: arrived.then_some(device.snr) }
         });
         Tokens::build(&situation, devices).0
+    }
+
+    /// The same as the network's first layer sees it.
+    #[must_use]
+    pub fn sample(&self) -> Sample {
+        normalise(&self.tokens())
     }
 
     /// The same for the replay memory.

@@ -45,7 +45,7 @@ impl Encoding for PaperTokens {
     }
 
     fn observe(&self, flight: &Flight) -> Seen {
-        let sample = flight.observe().with(flight.preference());
+        let sample = flight.sample();
         let devices = sample.devices_present().iter().filter_map(|device| device.first_chunk());
         Seen { cell: flight.episode().uav(), uav: sample.uav, devices: devices.copied().collect() }
     }
@@ -79,7 +79,7 @@ mod tests {
         flight.step(Action::East);
         let tokens = PaperTokens::of(&world);
         let seen = tokens.observe(&flight);
-        let plain = flight.observe().with(Preference::DATA);
+        let plain = flight.sample();
         assert_eq!((seen.uav, seen.devices.len()), (plain.uav, 6));
         assert!(seen.devices.iter().zip(plain.devices).all(|(ours, flies)| *ours == flies[..DEVICE]));
         let Cell { x, y } = flight.episode().uav();

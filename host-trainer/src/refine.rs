@@ -15,6 +15,11 @@
 //! seen what that move lost: it makes the move itself less likely, the more the surer the policy was (unlikelihood,
 //! Welleck et al. 2020).
 //!
+//! The same blindness keeps a policy from trying another tour: the next device is settled many moves ahead, and each of
+//! these moves is as sure as the others. So where the policy would do what it cannot have tried otherwise and the planner
+//! sees a loss, the planner sometimes flies for some slots: a prompt. What it flew is learned if it went better than the
+//! critic expected of the policy, and only until the policy is likely to try it itself.
+//!
 //! Each mission is seen in one of the eight views, turned or mirrored, so that nothing is learned of north alone.
 
 use crate::checkpoint::{self, CheckpointError};
@@ -29,21 +34,24 @@ use crate::train::{Learned, Tables, TrainError, Validation};
 use crate::variety::{Setting, Variety};
 use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
-use gleaner_world::{Realization, ScenarioKind, World};
+use gleaner_world::{Realization, ScenarioKind, Stream, World};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 
 /// The checkpoint's name inside the output folder.
 pub const CHECKPOINT: &str = "refine.checkpoint";
+/// The folder inside the output folder that holds the policy as it stands, where the output folder has its best.
+pub const LAST: &str = "last";
 /// Missions in the air at once, and slots that each flies between two updates.
-const FLIGHTS: usize = 128;
+const FLIGHTS: u64 = 128;
 const SLOTS: usize = 32;
 /// So many of them are always out and back for energy alone. That mission lasts two slots, so among drawn ones it
 /// would hardly be seen, and it must be flown exactly.
-const SHORTEST: usize = 3;
+const SHORTEST: u64 = 3;
 /// Passes over what was flown, and samples of one gradient step.
 const PASSES: usize = 2;
 const MINIBATCH: usize = 512;
@@ -69,6 +77,17 @@ const ADVANTAGE_MAX: f32 = 8.0;
 const NOISE: f32 = 0.5;
 /// Weight of the unlikelihood, in standard deviations of the advantage.
 const UNLIKELIHOOD: f32 = 1.0;
+/// Share of the slots with a move that the planner would not make in which the planner is heard, and the chance that it
+/// is heard in the next slot too: one move alone is soon undone.
+const PROMPTS: f64 = 0.5;
+const GOING_ON: f64 = 0.8;
+/// A prompt shows what the policy would hardly try itself, where what it would do loses so much utility.
+const UNLIKELY: f32 = 0.2;
+const WORTH_A_PROMPT: f32 = 1.5;
+/// Random words that a slot's prompt may use.
+const CHANCES: u128 = 1 << 20;
+/// What is learned of a prompt must have gone better than this, in standard deviations of the advantage: luck alone does.
+const LUCK: f32 = 0.7;
 /// The longest gradient that is followed.
 const GRADIENT_MAX: f32 = 0.5;
 /// Share of the actor that its running average takes over per update.
@@ -80,11 +99,21 @@ struct Experience {
     mask: ActionMask,
     action: Action,
     log_probability: f32,
+    /// Whether the planner chose it.
+    prompted: bool,
     /// What the slot brought and what it changed of what is still to be had, utility.
     gain: f32,
     /// What the critic expected of the gains from here on.
     value: f32,
     over: bool,
+}
+
+/// A flight in the air as the checkpoint keeps it: flown again, it is where it was.
+#[derive(Default, Serialize, Deserialize)]
+struct Begun {
+    mission: u64,
+    actions: Vec<u8>,
+    prompted: bool,
 }
 
 /// What an update saw: means.
@@ -107,20 +136,37 @@ struct Going {
     flight: Flight,
     prospect: Prospect,
     ahead: f32,
+    /// Whether the slot before was flown as the planner would.
+    prompted: bool,
+    /// Chance of this mission's prompts: a stretch of [`CHANCES`] words for each slot.
+    chance: ChaCha8Rng,
 }
 
 /// A run of refinement.
 pub struct Refinement {
     method: String,
     settings: Settings,
-    variety: Variety,
+    missions: Missions,
     world: Arc<World>,
     validation: Validation,
     flights: Vec<Going>,
     kept: Kept,
     rng: ChaCha8Rng,
+    /// What passes through actor and critic.
+    desks: [Desk; 2],
+}
+
+/// Memory for one network's passes.
+#[derive(Default)]
+struct Desk {
     batch: Batch,
     workspace: Workspace,
+}
+
+/// Where missions come from.
+struct Missions {
+    settings: Settings,
+    variety: Variety,
 }
 
 /// What the checkpoint keeps.
@@ -131,8 +177,7 @@ struct Kept {
     averaged: Vec<f32>,
     critic: Vec<f32>,
     adams: [Adam; 2],
-    flights: Vec<(u64, Vec<u8>)>,
-    next_mission: u64,
+    flights: Vec<Begun>,
     update: u64,
     steps: u64,
     rng_word: u128,
@@ -142,16 +187,41 @@ const fn critic_shape() -> Shape {
     Shape { outputs: 1, ..Shape::critic() }
 }
 
+impl Missions {
+    /// The flights in the air share the missions out: each goes on with the one that is [`FLIGHTS`] later.
+    fn begin(&self, mission: u64) -> Result<Going, TrainError> {
+        let Setting { world, rates, reports_missing } = self.variety.setting(mission);
+        let mut drawn = self.settings.mission(world, mission)?;
+        let (round, index) = (mission / FLIGHTS, mission % FLIGHTS);
+        if index < SHORTEST && self.settings.share_rb > 0.0 {
+            let scenario = ScenarioKind::ReturnBase.scenario().in_city(world.city());
+            drawn.realization = Realization::draw(world.city(), &scenario, drawn.seed)?;
+            drawn.preference = Preference::ENERGY;
+        }
+        let flight = Flight::new(world, &drawn.realization, drawn.seed, drawn.preference)?
+            .with_reports_missing(reports_missing, drawn.seed);
+        let mut prospect = Prospect::new(rates.study(&drawn.realization), mission);
+        let ahead = prospect.value(&flight);
+        let view = View::ALL[(round + index) as usize % View::ALL.len()];
+        let chance = drawn.seed.repeat(u32::MAX - 1).rng(Stream::Choices);
+        Ok(Going { mission, view, actions: Vec::new(), flight, prospect, ahead, prompted: false, chance })
+    }
+}
+
 impl Refinement {
-    /// Goes on from the checkpoint in `folder`, or begins with the actor of `from`, its logits multiplied by
+    /// Goes on from the checkpoint in `folder`, or begins with the actor of `first`, its logits multiplied by
     /// `confidence`: a pupil that holds many actions for good flies better by the one it holds for best.
+    ///
+    /// With `others` it begins with the mean of all their weights. Runs that began alike wander around the same place,
+    /// and the middle of them is better than each (model soups, Wortsman et al. 2022).
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
     pub fn open(
         settings: Settings,
         folder: &Path,
-        from: &Learned,
+        first: &Learned,
+        others: &[Learned],
         confidence: f32,
     ) -> Result<Refinement, TrainError> {
         let path = folder.join(CHECKPOINT);
@@ -167,71 +237,54 @@ impl Refinement {
             kept
         } else {
             let critic = critic_shape().initialise(&mut rng);
-            let actor = confident(&from.actor, confidence);
+            let mut actor = first.actor.clone();
+            for (count, other) in (2_u16..).zip(others) {
+                net::polyak(&mut actor, &other.actor, 1.0 / f32::from(count));
+            }
+            confident(&mut actor, confidence);
             Kept {
                 averaged: actor.clone(),
                 adams: [Adam::new(actor.len(), 0.0), Adam::new(critic.len(), 0.0)],
                 actor,
                 critic,
                 flights: Vec::new(),
-                next_mission: 0,
                 update: 0,
-                steps: from.steps,
+                steps: first.steps + others.iter().map(|other| other.steps).sum::<u64>(),
                 rng_word: 0,
                 settings: settings.clone(),
             }
         };
         let world = Arc::new(World::default_world());
-        let before = from.settings.command_line(&from.method, "FIRST");
+        let before = first.settings.command_line(&first.method, "FIRST");
         let mut run = Refinement {
             method: format!(
-                "{} && gleaner-train refine --from FIRST --confidence {confidence}",
-                before.trim_start_matches("gleaner-train ")
+                "{} && gleaner-train refine --from FIRST{} --confidence {confidence}",
+                before.trim_start_matches("gleaner-train "),
+                " --from OTHER".repeat(others.len())
             ),
-            variety: Variety::new(&world, &settings),
+            missions: Missions { variety: Variety::new(&world, &settings), settings: settings.clone() },
             validation: Validation::draw(&world, &settings)?,
             settings,
             world,
             flights: Vec::new(),
             kept,
             rng,
-            batch: Batch::new(),
-            workspace: Workspace::new(),
+            desks: Default::default(),
         };
-        for (index, (mission, actions)) in std::mem::take(&mut run.kept.flights).into_iter().enumerate() {
-            let mut going = run.begin(index, mission)?;
-            for action in actions {
-                going.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
-            }
-            run.flights.push(going);
-        }
-        for index in run.flights.len()..FLIGHTS {
-            let going = run.next_flight(index)?;
-            run.flights.push(going);
-        }
+        let mut begun = std::mem::take(&mut run.kept.flights);
+        begun.extend((begun.len() as u64..FLIGHTS).map(|mission| Begun { mission, ..Begun::default() }));
+        run.flights = begun
+            .into_par_iter()
+            .map(|begun| {
+                let mut going = run.missions.begin(begun.mission)?;
+                for action in begun.actions {
+                    going.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
+                }
+                going.prompted = begun.prompted;
+                Ok(going)
+            })
+            .collect::<Result<_, TrainError>>()?;
         Ok(run)
-    }
-
-    fn begin(&self, index: usize, mission: u64) -> Result<Going, TrainError> {
-        let Setting { world, rates, reports_missing } = self.variety.setting(mission);
-        let mut drawn = self.settings.mission(world, mission)?;
-        if index < SHORTEST && self.settings.share_rb > 0.0 {
-            let scenario = ScenarioKind::ReturnBase.scenario().in_city(world.city());
-            drawn.realization = Realization::draw(world.city(), &scenario, drawn.seed)?;
-            drawn.preference = Preference::ENERGY;
-        }
-        let flight = Flight::new(world, &drawn.realization, drawn.seed, drawn.preference)?
-            .with_reports_missing(reports_missing, drawn.seed);
-        let mut prospect = Prospect::new(rates.study(&drawn.realization), mission);
-        let ahead = prospect.value(&flight);
-        let view = View::ALL[mission as usize % View::ALL.len()];
-        Ok(Going { mission, view, actions: Vec::new(), flight, prospect, ahead })
-    }
-
-    fn next_flight(&mut self, index: usize) -> Result<Going, TrainError> {
-        let mission = self.kept.next_mission;
-        self.kept.next_mission += 1;
-        self.begin(index, mission)
     }
 
     /// Updates done.
@@ -251,13 +304,14 @@ impl Refinement {
     /// # Errors
     /// No mission could be drawn.
     pub fn advance(&mut self) -> Result<Findings, TrainError> {
-        let mut flown: Vec<Vec<Experience>> = (0..FLIGHTS).map(|_| Vec::with_capacity(SLOTS)).collect();
+        let mut flown: Vec<Vec<Experience>> =
+            self.flights.iter().map(|_| Vec::with_capacity(SLOTS)).collect();
         for _ in 0..SLOTS {
             self.fly(&mut flown)?;
         }
-        let samples: Vec<Sample> = self.flights.iter().map(Going::sees).collect();
-        let ahead = self.values(&samples);
-        let mut lessons = Vec::with_capacity(FLIGHTS * SLOTS);
+        let samples = self.see();
+        let ahead = values(&self.kept.critic, &mut self.desks[1], &samples);
+        let mut lessons = Vec::with_capacity(flown.len() * SLOTS);
         for (experiences, ahead) in flown.into_iter().zip(ahead) {
             lessons.extend(judge(experiences, ahead));
         }
@@ -269,113 +323,71 @@ impl Refinement {
         Ok(findings)
     }
 
-    /// One slot of every flight.
-    fn fly(&mut self, flown: &mut [Vec<Experience>]) -> Result<(), TrainError> {
-        let samples: Vec<Sample> = self.flights.iter().map(Going::sees).collect();
-        let logits = Network::new(Shape::actor(), &self.kept.actor).logits(samples.iter().copied());
-        let values = self.values(&samples);
-        for (index, ((sample, logits), value)) in samples.into_iter().zip(logits).zip(values).enumerate() {
-            let going = &mut self.flights[index];
-            let mask = going.mask();
-            let policy = Distribution::new(&logits, mask);
-            let action = policy.pick(self.rng.random());
-            let gain = going.step(going.meant(action));
-            let over = going.flight.is_over();
-            let log_probability = policy.log_probability[action.index()];
-            flown[index].push(Experience { sample, mask, action, log_probability, gain, value, over });
-            self.kept.steps += 1;
-            if over {
-                self.flights[index] = self.next_flight(index)?;
-            }
-        }
-        Ok(())
+    fn see(&self) -> Vec<Sample> {
+        self.flights.par_iter().map(Going::sees).collect()
     }
 
-    /// What the critic expects of the gains from these states on, utility.
-    fn values(&mut self, samples: &[Sample]) -> Vec<f32> {
-        self.batch.clear();
-        samples.iter().for_each(|sample| self.batch.push_sample(sample));
-        let outputs = net::forward(&critic_shape(), &self.kept.critic, &self.batch, &mut self.workspace);
-        outputs.iter().map(|value| value * VALUE_SCALE).collect()
+    /// One slot of every flight.
+    fn fly(&mut self, flown: &mut [Vec<Experience>]) -> Result<(), TrainError> {
+        let samples = self.see();
+        let Kept { actor, critic, .. } = &self.kept;
+        let (logits, values) = rayon::join(
+            || Network::new(Shape::actor(), actor).logits(samples.iter().copied()),
+            || values(critic, &mut self.desks[1], &samples),
+        );
+        let units: Vec<f32> = samples.iter().map(|_| self.rng.random()).collect();
+        self.kept.steps += samples.len() as u64;
+        let missions = &self.missions;
+        let slots = samples.into_par_iter().zip(logits).zip(values).zip(units);
+        self.flights.par_iter_mut().zip(flown).zip(slots).try_for_each(
+            |((going, flown), (((sample, logits), value), unit))| {
+                let mask = going.mask();
+                let policy = Distribution::new(&logits, mask);
+                let (action, prompted) = going.prompt(policy.pick(unit), &policy);
+                let gain = going.step(going.meant(action));
+                let over = going.flight.is_over();
+                let log_probability = policy.log_probability[action.index()];
+                flown.push(Experience { sample, mask, action, log_probability, prompted, gain, value, over });
+                if over {
+                    *going = missions.begin(going.mission + FLIGHTS)?;
+                }
+                Ok(())
+            },
+        )
     }
 
     fn learn(&mut self, lessons: &[Lesson]) -> Findings {
         let rate = self.settings.learning_rate_at(self.kept.update);
-        let mut order: Vec<usize> = (0..lessons.len()).collect();
-        let (mut findings, mut count) = (Findings::default(), 0.0);
+        let mut order: Vec<&Lesson> = lessons.iter().collect();
+        let mut passes = Vec::with_capacity(PASSES * order.len());
         for _ in 0..PASSES {
             for last in (1..order.len()).rev() {
                 order.swap(last, self.rng.random_range(0..=last));
             }
-            for chosen in order.chunks(MINIBATCH) {
-                let chosen: Vec<&Lesson> = chosen.iter().map(|&index| &lessons[index]).collect();
-                self.batch.clear();
-                chosen.iter().for_each(|lesson| self.batch.push_sample(&lesson.sample));
-                findings.critic += self.teach_critic(&chosen, rate * CRITIC_RATE);
-                if self.kept.update >= CRITIC_FIRST {
-                    let (entropy, divergence) = self.teach_actor(&chosen, rate);
-                    findings.entropy += entropy;
-                    findings.divergence += divergence;
-                }
-                count += 1.0;
-            }
+            passes.extend_from_slice(&order);
         }
-        Findings {
-            critic: findings.critic / count,
-            entropy: findings.entropy / count,
-            divergence: findings.divergence / count,
-        }
-    }
-
-    fn teach_critic(&mut self, lessons: &[&Lesson], rate: f32) -> f32 {
-        let scale = 1.0 / lessons.len() as f32;
-        let mut gradients = vec![0.0; self.kept.critic.len()];
-        let mut loss = 0.0;
-        net::forward_backward(
-            &critic_shape(),
-            &self.kept.critic,
-            &self.batch,
-            &mut self.workspace,
-            |range, outputs, gradients| {
-                for ((value, gradient), lesson) in outputs.iter().zip(gradients).zip(&lessons[range]) {
-                    let error = value - lesson.gained / VALUE_SCALE;
-                    loss += 0.5 * scale * error * error;
-                    *gradient = scale * error;
-                }
+        let count = passes.chunks(MINIBATCH).len() as f32;
+        let learns_to_act = self.kept.update >= CRITIC_FIRST;
+        let Kept { actor, critic, adams: [actor_adam, critic_adam], .. } = &mut self.kept;
+        let [actor_desk, critic_desk] = &mut self.desks;
+        let (acting, judging) = rayon::join(
+            || {
+                let chunks = passes.chunks(MINIBATCH).filter(|_| learns_to_act);
+                chunks.fold([0.0; 2], |[entropy, divergence], lessons| {
+                    let (h, kl) = teach_actor(actor, actor_adam, actor_desk, lessons, rate);
+                    [entropy + h, divergence + kl]
+                })
             },
-            &mut gradients,
-        );
-        shorten(&mut gradients);
-        self.kept.adams[1].lr = rate;
-        self.kept.adams[1].step(&mut self.kept.critic, &gradients);
-        loss
-    }
-
-    /// Gives mean entropy and divergence.
-    fn teach_actor(&mut self, lessons: &[&Lesson], rate: f32) -> (f32, f32) {
-        let scale = 1.0 / lessons.len() as f32;
-        let mut gradients = vec![0.0; self.kept.actor.len()];
-        let (mut entropy, mut divergence) = (0.0, 0.0);
-        net::forward_backward(
-            &Shape::actor(),
-            &self.kept.actor,
-            &self.batch,
-            &mut self.workspace,
-            |range, outputs, gradients| {
-                let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
-                for ((logits, gradients), lesson) in rows.zip(&lessons[range]) {
-                    let (h, kl) = lesson.gradient(logits, gradients);
-                    gradients.iter_mut().for_each(|gradient| *gradient *= scale);
-                    entropy += scale * h;
-                    divergence += scale * kl;
-                }
+            || {
+                let rate = rate * CRITIC_RATE;
+                let chunks = passes.chunks(MINIBATCH);
+                chunks
+                    .map(|lessons| teach_critic(critic, critic_adam, critic_desk, lessons, rate))
+                    .sum::<f32>()
             },
-            &mut gradients,
         );
-        shorten(&mut gradients);
-        self.kept.adams[0].lr = rate;
-        self.kept.adams[0].step(&mut self.kept.actor, &gradients);
-        (entropy, divergence)
+        let [entropy, divergence] = acting.map(|sum| sum / count);
+        Findings { critic: judging / count, entropy, divergence }
     }
 
     /// Judges the averaged actor, and offers it to `best`.
@@ -383,7 +395,13 @@ impl Refinement {
     /// # Errors
     /// The network's answer is not a number.
     pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
-        let candidate = Learned {
+        Ok(self.validation.examine(&self.world, self.last(), best)?)
+    }
+
+    /// The averaged actor as it stands.
+    #[must_use]
+    pub fn last(&self) -> Learned {
+        Learned {
             system: System::Gleaner,
             method: self.method.clone(),
             settings: self.settings.clone(),
@@ -391,24 +409,106 @@ impl Refinement {
             update: self.kept.update,
             steps: self.kept.steps,
             score: f64::NEG_INFINITY,
-        };
-        Ok(self.validation.examine(&self.world, candidate, best)?)
+        }
     }
 
-    /// Writes everything that the next update depends on.
+    /// Writes everything that the next update depends on, and the policy as it stands to [`LAST`].
     ///
     /// # Errors
     /// The disk; the last good checkpoint is then still there.
     pub fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
         self.kept.rng_word = self.rng.get_word_pos();
-        self.kept.flights = self.flights.iter().map(|going| (going.mission, going.actions.clone())).collect();
-        checkpoint::save(&folder.join(CHECKPOINT), &self.kept)
+        let begun = |going: &Going| Begun {
+            mission: going.mission,
+            actions: going.actions.clone(),
+            prompted: going.prompted,
+        };
+        self.kept.flights = self.flights.iter().map(begun).collect();
+        checkpoint::save(&folder.join(CHECKPOINT), &self.kept)?;
+        let last = folder.join(LAST);
+        std::fs::create_dir_all(&last)
+            .map_err(|source| CheckpointError::Io { path: last.clone(), source })?;
+        self.last().save(&last)
     }
+}
+
+/// What the critic expects of the gains from these states on, utility.
+fn values(critic: &[f32], desk: &mut Desk, samples: &[Sample]) -> Vec<f32> {
+    desk.lay(samples.iter());
+    let outputs = net::answer(&critic_shape(), critic, &desk.batch, &mut desk.workspace);
+    outputs.iter().map(|value| value * VALUE_SCALE).collect()
+}
+
+impl Desk {
+    fn lay<'a>(&mut self, samples: impl Iterator<Item = &'a Sample>) {
+        self.batch.clear();
+        samples.for_each(|sample| self.batch.push_sample(sample));
+    }
+}
+
+/// A gradient step; gives half the mean squared error, scaled.
+fn teach_critic(critic: &mut [f32], adam: &mut Adam, desk: &mut Desk, lessons: &[&Lesson], rate: f32) -> f32 {
+    let scale = 1.0 / lessons.len() as f32;
+    let mut gradients = vec![0.0; critic.len()];
+    let mut loss = 0.0;
+    desk.lay(lessons.iter().map(|lesson| &lesson.sample));
+    net::forward_backward(
+        &critic_shape(),
+        critic,
+        &desk.batch,
+        &mut desk.workspace,
+        |range, outputs, gradients| {
+            for ((value, gradient), lesson) in outputs.iter().zip(gradients).zip(&lessons[range]) {
+                let error = value - lesson.gained / VALUE_SCALE;
+                loss += 0.5 * scale * error * error;
+                *gradient = scale * error;
+            }
+        },
+        &mut gradients,
+    );
+    shorten(&mut gradients);
+    adam.lr = rate;
+    adam.step(critic, &gradients);
+    loss
+}
+
+/// A gradient step; gives mean entropy and divergence.
+fn teach_actor(
+    actor: &mut [f32],
+    adam: &mut Adam,
+    desk: &mut Desk,
+    lessons: &[&Lesson],
+    rate: f32,
+) -> (f32, f32) {
+    let scale = 1.0 / lessons.len() as f32;
+    let mut gradients = vec![0.0; actor.len()];
+    let (mut entropy, mut divergence) = (0.0, 0.0);
+    desk.lay(lessons.iter().map(|lesson| &lesson.sample));
+    net::forward_backward(
+        &Shape::actor(),
+        actor,
+        &desk.batch,
+        &mut desk.workspace,
+        |range, outputs, gradients| {
+            let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
+            for ((logits, gradients), lesson) in rows.zip(&lessons[range]) {
+                let (h, kl) = lesson.gradient(logits, gradients);
+                gradients.iter_mut().for_each(|gradient| *gradient *= scale);
+                entropy += scale * h;
+                divergence += scale * kl;
+            }
+        },
+        &mut gradients,
+    );
+    shorten(&mut gradients);
+    adam.lr = rate;
+    adam.step(actor, &gradients);
+    (entropy, divergence)
 }
 
 impl Going {
     fn sees(&self) -> Sample {
-        self.flight.observe().with(self.flight.preference()).seen(self.view)
+        self.flight.sample().seen(self.view)
     }
 
     /// What the guard allows, as it looks in the view.
@@ -419,6 +519,28 @@ impl Going {
     /// The action that is called this in the view.
     fn meant(&self, seen: Action) -> Action {
         Action::ALL.into_iter().find(|&action| self.view.action(action) == seen).unwrap_or(seen)
+    }
+
+    /// What is flown where the policy has picked `picked`, and whether that is a prompt.
+    fn prompt(&mut self, picked: Action, policy: &Distribution) -> (Action, bool) {
+        self.chance.set_word_pos(self.actions.len() as u128 * CHANCES);
+        let goes_on = self.prompted && self.chance.random_bool(GOING_ON);
+        let begins = !self.prompted && self.chance.random_bool(PROMPTS);
+        let advice = self.prospect.advice(&self.flight).map(|action| self.view.action(action));
+        let advice = advice.filter(|&advice| advice != picked && self.mask().allows(advice));
+        let Some(advice) = advice else {
+            // Both are of one mind.
+            self.prompted = goes_on;
+            return (picked, false);
+        };
+        self.prompted = goes_on || (begins && self.is_worth_a_prompt(picked, advice, policy));
+        (if self.prompted { advice } else { picked }, self.prompted)
+    }
+
+    fn is_worth_a_prompt(&mut self, picked: Action, advice: Action, policy: &Distribution) -> bool {
+        let picked = self.meant(picked);
+        policy.probability[advice.index()] < UNLIKELY
+            && self.prospect.loss(&self.flight, picked, &mut self.chance) > WORTH_A_PROMPT
     }
 
     /// Flies a slot; gives what it gained.
@@ -437,6 +559,7 @@ struct Lesson {
     mask: ActionMask,
     action: Action,
     log_probability: f32,
+    prompted: bool,
     /// How much better it went than expected, under the preference.
     advantage: f32,
     /// What was gained from here on: the critic's target.
@@ -459,11 +582,14 @@ fn judge(experiences: Vec<Experience>, ahead: f32) -> Vec<Lesson> {
             mask: experience.mask,
             action: experience.action,
             log_probability: experience.log_probability,
+            prompted: experience.prompted,
             advantage,
             gained: advantage + experience.value,
             lost: if experience.over { (-experience.gain - NOISE).max(0.0) } else { 0.0 },
         });
-        (next_value, next_advantage) = (experience.value, advantage);
+        // What came of a prompt is no merit of what the policy did before.
+        let is_merit = !experience.prompted;
+        (next_value, next_advantage) = (experience.value, if is_merit { advantage } else { 0.0 });
     }
     lessons
 }
@@ -490,18 +616,24 @@ impl Lesson {
     /// The gradient of the clipped objective and the entropy for the logits; gives entropy and divergence.
     fn gradient(&self, logits: &[f32; Action::COUNT], gradient: &mut [f32; Action::COUNT]) -> (f32, f32) {
         let policy = Distribution::new(logits, self.mask);
-        let change = policy.log_probability[self.action.index()] - self.log_probability;
+        let taken = self.action.index();
+        let change = policy.log_probability[taken] - self.log_probability;
         let ratio = change.exp();
-        let is_clipped = if self.advantage > 0.0 { ratio > 1.0 + CLIP } else { ratio < 1.0 - CLIP };
-        let push = if is_clipped { 0.0 } else { self.advantage * ratio };
+        let push = if self.prompted {
+            // Until it is likely enough that the policy tries it itself.
+            if policy.probability[taken] < UNLIKELY { (self.advantage - LUCK).max(0.0) } else { 0.0 }
+        } else {
+            let is_clipped = if self.advantage > 0.0 { ratio > 1.0 + CLIP } else { ratio < 1.0 - CLIP };
+            if is_clipped { 0.0 } else { self.advantage * ratio }
+        };
         let entropy = -policy.expectation(|action| policy.log_probability[action]);
         for (action, gradient) in gradient.iter_mut().enumerate() {
             let p = policy.probability[action];
-            let chosen = if action == self.action.index() { 1.0 } else { 0.0 };
+            let chosen = if action == taken { 1.0 } else { 0.0 };
             *gradient = -push * (chosen - p) + ENTROPY * p * (policy.log_probability[action] + entropy);
         }
         self.unlearn(&policy, gradient);
-        (entropy, ratio - 1.0 - change)
+        (entropy, if self.prompted { 0.0 } else { ratio - 1.0 - change })
     }
 }
 
@@ -530,13 +662,11 @@ fn shorten(gradient: &mut [f32]) {
     }
 }
 
-/// The same decisions, made with more confidence.
-fn confident(actor: &[f32], confidence: f32) -> Vec<f32> {
-    let mut actor = actor.to_vec();
+/// Makes the same decisions with more confidence.
+fn confident(actor: &mut [f32], confidence: f32) {
     for tensor in Shape::actor().tensors().iter().filter(|tensor| tensor.name.starts_with("head.1.")) {
         actor[tensor.offset..tensor.offset + tensor.len()].iter_mut().for_each(|x| *x *= confidence);
     }
-    actor
 }
 
 #[cfg(test)]
@@ -549,6 +679,7 @@ mod tests {
             mask: ActionMask::FULL,
             action,
             log_probability: 0.0,
+            prompted: false,
             advantage: 0.0,
             gained: 0.0,
             lost,

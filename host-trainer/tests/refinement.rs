@@ -3,7 +3,7 @@
 use clap::Parser;
 use gleaner_host_trainer::learned::Learned;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::refine::Refinement;
+use gleaner_host_trainer::refine::{LAST, Refinement};
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::variety::Variety;
@@ -40,7 +40,7 @@ fn untrained() -> Learned {
 #[test]
 fn resuming_gives_the_same_bits_as_never_having_stopped() {
     let (from, folder) = (untrained(), tempfile::tempdir().unwrap());
-    let open = || Refinement::open(settings(&[]), folder.path(), &from, 1.0).unwrap();
+    let open = || Refinement::open(settings(&[]), folder.path(), &from, &[], 1.0).unwrap();
     let mut through = open();
     let findings: Vec<_> = (0..4).map(|_| through.advance().unwrap()).collect();
     assert!(through.is_done());
@@ -58,10 +58,27 @@ fn resuming_gives_the_same_bits_as_never_having_stopped() {
 }
 
 #[test]
+fn it_begins_in_the_middle_of_several_and_leaves_where_it_stands() {
+    let (first, folder) = (untrained(), tempfile::tempdir().unwrap());
+    let with = |by: f32| {
+        let actor = first.actor.iter().map(|weight| weight + by).collect();
+        Learned { actor, ..first.clone() }
+    };
+    let mut run =
+        Refinement::open(settings(&[]), folder.path(), &first, &[with(0.25), with(0.5)], 1.0).unwrap();
+    run.save(folder.path()).unwrap();
+    let last = Learned::load(&folder.path().join(LAST)).unwrap().unwrap();
+    for (weight, one) in last.actor.iter().zip(&first.actor) {
+        assert!((weight - (one + 0.25)).abs() < 1e-6, "{weight}, {one}");
+    }
+    assert!(last.method.contains("--from FIRST --from OTHER --from OTHER"), "{}", last.method);
+}
+
+#[test]
 fn the_critic_learns_what_a_mission_brings() {
     let from = untrained();
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Refinement::open(settings(&[]), folder.path(), &from, 1.0).unwrap();
+    let mut run = Refinement::open(settings(&[]), folder.path(), &from, &[], 1.0).unwrap();
     let first = run.advance().unwrap().critic;
     run.advance().unwrap();
     run.advance().unwrap();

@@ -93,7 +93,7 @@ fn a_pupil_of_its_own_views_is_of_one_mind() {
     let flights = flights
         .iter()
         .map(|(seed, realization)| Flight::new(&world, realization, *seed, Preference::DATA).unwrap());
-    let samples: Vec<_> = flights.map(|flight| flight.observe().with(flight.preference())).collect();
+    let samples: Vec<_> = flights.map(|flight| flight.sample()).collect();
     let discord = |actor: &[f32]| {
         let mut network = Network::new(Shape::actor(), actor);
         let means = network.averaged_logits(&samples);

@@ -61,9 +61,10 @@ pub struct DistilArguments {
 /// What only the refinement takes.
 #[derive(Debug, clap::Args)]
 pub struct RefineArguments {
-    /// Begin with what the run in this folder has learned.
-    #[arg(long)]
-    from: PathBuf,
+    /// Begin with what the run in this folder has learned. Repeatable: with the mean of the weights of runs that began
+    /// alike. FOLDER/last is where a refinement stands, FOLDER its best by validation.
+    #[arg(long, required = true, value_name = "FOLDER")]
+    from: Vec<PathBuf>,
     /// Its logits are multiplied by this first: what was taught is unsure, what was refined is not (1).
     #[arg(long, default_value_t = 2.5)]
     confidence: f32,
@@ -136,11 +137,13 @@ pub fn distil(arguments: &DistilArguments) -> Result<()> {
 
 /// Learns from its own flights: refinement.
 pub fn refine(arguments: &RefineArguments) -> Result<()> {
-    let from = learned_of(System::Gleaner, &arguments.from)?;
+    let from = arguments.from.iter().map(|folder| learned_of(System::Gleaner, folder));
+    let from = from.collect::<Result<Vec<_>>>()?;
+    let [first, others @ ..] = &from[..] else { bail!("--from: name a run") };
     let confidence = arguments.confidence;
     let arguments = &arguments.usual;
     let mut desk = Desk::open(System::Gleaner, arguments)?;
-    let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, &from, confidence)?;
+    let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, first, others, confidence)?;
     desk.begin(run.update())?;
     while !run.is_done() {
         let findings = run.advance()?;

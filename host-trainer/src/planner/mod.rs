@@ -13,8 +13,8 @@ pub use search::{Effort, Problem};
 pub use tour::{DEVICES_MAX, State, Stop, Tour};
 
 use crate::flight::Flight;
-use gleaner_units::Cell;
-use rand::SeedableRng;
+use gleaner_units::{Action, Cell};
+use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 /// The largest weight of data that is planned with. With data alone every tour that brings the same would do, and
@@ -27,6 +27,9 @@ const DETOURS: f32 = 0.15;
 /// The search at every slot, from the tour of the slot before.
 const REFINE: Effort = Effort { tours: 250, temperatures: [0.5, 0.05] };
 
+/// The search that is to tell a loss from a tour that was not found.
+const DOUBT: Effort = Effort { tours: 1_000, temperatures: [1.0, 0.05] };
+
 /// What is still to be had in a mission under way, slot by slot.
 #[derive(Clone, Debug)]
 pub struct Prospect {
@@ -34,13 +37,15 @@ pub struct Prospect {
     rng: ChaCha8Rng,
     tour: Option<Tour>,
     cell: Option<Cell>,
+    /// What the tour brings.
+    value: f32,
 }
 
 impl Prospect {
     /// Of a mission that begins; all chance of the search comes from `seed`.
     #[must_use]
     pub fn new(known: Known, seed: u64) -> Prospect {
-        Prospect { known, rng: ChaCha8Rng::seed_from_u64(seed), tour: None, cell: None }
+        Prospect { known, rng: ChaCha8Rng::seed_from_u64(seed), tour: None, cell: None, value: 0.0 }
     }
 
     /// The utility that the best tour brings which is found from where the flight is, `w . (percent, -battery units)`
@@ -71,6 +76,29 @@ impl Prospect {
         };
         self.tour = Some(tour);
         self.cell = Some(state.cell);
+        self.value = value;
         value
+    }
+
+    /// What the tour begins with that [`Prospect::value`] found last, from where the flight is.
+    #[must_use]
+    pub fn advice(&self, flight: &Flight) -> Option<Action> {
+        let mut state = State::of(flight);
+        state.finish(&self.known, self.tour.as_ref()?);
+        state.first
+    }
+
+    /// What this action loses of what [`Prospect::value`] found last, utility; a longer search would find it smaller or as
+    /// small.
+    pub fn loss(&self, flight: &Flight, action: Action, rng: &mut impl Rng) -> f32 {
+        let before = State::of(flight);
+        let mut state = before;
+        state.slot(&self.known, action);
+        let w_data = flight.preference().w_data().min(THRIFT);
+        let so_far = Problem { known: &self.known, state: &before, w_data }.utility(&state);
+        let problem = Problem { known: &self.known, state: &state, w_data };
+        let tour = self.tour.clone().unwrap_or_default();
+        let after = if state.over { 0.0 } else { problem.anneal(tour, DOUBT, rng).0 };
+        self.value - so_far - after
     }
 }

@@ -43,6 +43,8 @@ pub struct State {
     pub collected: f32,
     /// Whether a move has ended the mission.
     pub over: bool,
+    /// The first action that was flown.
+    pub first: Option<Action>,
 }
 
 /// What an action takes from the battery, in hovers.
@@ -72,11 +74,12 @@ impl State {
             *remaining = units;
         }
         let hovers_left = (2.0 * battery.0).floor() as i32;
-        State { cell, hovers_left, remaining, collected: 0.0, over: false }
+        State { cell, hovers_left, remaining, collected: 0.0, over: false, first: None }
     }
 
     /// Flies one slot: whoever is heard best in the mean sends, then the aircraft hovers or moves.
     pub fn slot(&mut self, known: &Known, action: Action) {
+        self.first = self.first.or(Some(action));
         self.collected += self.serve(known);
         self.cell = self.cell.after(action);
         self.hovers_left -= hovers(action);
