@@ -718,6 +718,24 @@ mod tests {
     }
 
     #[test]
+    fn a_prompt_is_learned_if_it_went_well_and_only_until_it_is_likely() {
+        let pull = |advantage, logits: [f32; Action::COUNT]| {
+            let lesson = Lesson { prompted: true, advantage, ..mistake(Action::East, 0.0) };
+            let mut gradient = [0.0; Action::COUNT];
+            lesson.gradient(&logits, &mut gradient);
+            -gradient[Action::East.index()]
+        };
+        let [sure_of_hover, likely] = [[8.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]];
+        assert!(
+            pull(2.0, sure_of_hover) > 0.99 * (2.0 - LUCK),
+            "it does not vanish where the policy is sure"
+        );
+        assert!(pull(LUCK, sure_of_hover).abs() < 0.01, "luck teaches nothing");
+        assert!(pull(-3.0, sure_of_hover).abs() < 0.01, "nor what went worse");
+        assert!(pull(2.0, likely).abs() < 0.01, "from here on the policy tries it itself");
+    }
+
+    #[test]
     fn a_move_without_alternative_and_one_without_loss_teach_nothing() {
         let mut gradient = [0.0; Action::COUNT];
         let forced = Distribution::new(&[0.0; Action::COUNT], ActionMask::EMPTY.with(Action::North));
