@@ -145,7 +145,6 @@ struct Going {
 /// A run of refinement.
 pub struct Refinement {
     method: String,
-    settings: Settings,
     missions: Missions,
     world: Arc<World>,
     validation: Validation,
@@ -262,9 +261,8 @@ impl Refinement {
                 before.trim_start_matches("gleaner-train "),
                 " --from OTHER".repeat(others.len())
             ),
-            missions: Missions { variety: Variety::new(&world, &settings), settings: settings.clone() },
             validation: Validation::draw(&world, &settings)?,
-            settings,
+            missions: Missions { variety: Variety::new(&world, &settings), settings },
             world,
             flights: Vec::new(),
             kept,
@@ -296,7 +294,7 @@ impl Refinement {
     /// Whether the settings ask for no more updates.
     #[must_use]
     pub const fn is_done(&self) -> bool {
-        self.kept.update >= self.settings.updates
+        self.kept.update >= self.missions.settings.updates
     }
 
     /// Flies every mission for some slots, and learns from it.
@@ -357,7 +355,7 @@ impl Refinement {
     }
 
     fn learn(&mut self, lessons: &[Lesson]) -> Findings {
-        let rate = self.settings.learning_rate_at(self.kept.update);
+        let rate = self.missions.settings.learning_rate_at(self.kept.update);
         let mut order: Vec<&Lesson> = lessons.iter().collect();
         let mut passes = Vec::with_capacity(PASSES * order.len());
         for _ in 0..PASSES {
@@ -404,7 +402,7 @@ impl Refinement {
         Learned {
             system: System::Gleaner,
             method: self.method.clone(),
-            settings: self.settings.clone(),
+            settings: self.missions.settings.clone(),
             actor: self.kept.averaged.clone(),
             update: self.kept.update,
             steps: self.kept.steps,
@@ -526,6 +524,10 @@ impl Going {
         self.chance.set_word_pos(self.actions.len() as u128 * CHANCES);
         let goes_on = self.prompted && self.chance.random_bool(GOING_ON);
         let begins = !self.prompted && self.chance.random_bool(PROMPTS);
+        if !goes_on && !begins {
+            self.prompted = false;
+            return (picked, false);
+        }
         let advice = self.prospect.advice(&self.flight).map(|action| self.view.action(action));
         let advice = advice.filter(|&advice| advice != picked && self.mask().allows(advice));
         let Some(advice) = advice else {
@@ -540,7 +542,7 @@ impl Going {
     fn is_worth_a_prompt(&mut self, picked: Action, advice: Action, policy: &Distribution) -> bool {
         let picked = self.meant(picked);
         policy.probability[advice.index()] < UNLIKELY
-            && self.prospect.loss(&self.flight, picked, &mut self.chance) > WORTH_A_PROMPT
+            && self.ahead - self.prospect.value_with(&self.flight, picked, &mut self.chance) > WORTH_A_PROMPT
     }
 
     /// Flies a slot; gives what it gained.
@@ -635,9 +637,7 @@ impl Lesson {
         self.unlearn(&policy, gradient);
         (entropy, if self.prompted { 0.0 } else { ratio - 1.0 - change })
     }
-}
 
-impl Lesson {
     /// Adds the gradient of `-lost log(1 - p)`, p the probability of the action: unlike a policy's, it does not vanish
     /// where the policy is sure. What the action gives up goes to the others as they stand.
     fn unlearn(&self, policy: &Distribution, gradient: &mut [f32; Action::COUNT]) {

@@ -37,15 +37,13 @@ pub struct Prospect {
     rng: ChaCha8Rng,
     tour: Option<Tour>,
     cell: Option<Cell>,
-    /// What the tour brings.
-    value: f32,
 }
 
 impl Prospect {
     /// Of a mission that begins; all chance of the search comes from `seed`.
     #[must_use]
     pub fn new(known: Known, seed: u64) -> Prospect {
-        Prospect { known, rng: ChaCha8Rng::seed_from_u64(seed), tour: None, cell: None, value: 0.0 }
+        Prospect { known, rng: ChaCha8Rng::seed_from_u64(seed), tour: None, cell: None }
     }
 
     /// The utility that the best tour brings which is found from where the flight is, `w . (percent, -battery units)`
@@ -76,7 +74,6 @@ impl Prospect {
         };
         self.tour = Some(tour);
         self.cell = Some(state.cell);
-        self.value = value;
         value
     }
 
@@ -88,9 +85,8 @@ impl Prospect {
         state.first
     }
 
-    /// What this action loses of what [`Prospect::value`] found last, utility; a longer search would find it smaller or as
-    /// small.
-    pub fn loss(&self, flight: &Flight, action: Action, rng: &mut impl Rng) -> f32 {
+    /// The utility that is found when this action is flown now, what the slot itself brings included.
+    pub fn value_with(&self, flight: &Flight, action: Action, rng: &mut impl Rng) -> f32 {
         let before = State::of(flight);
         let mut state = before;
         state.slot(&self.known, action);
@@ -99,6 +95,6 @@ impl Prospect {
         let problem = Problem { known: &self.known, state: &state, w_data };
         let tour = self.tour.clone().unwrap_or_default();
         let after = if state.over { 0.0 } else { problem.anneal(tour, DOUBT, rng).0 };
-        self.value - so_far - after
+        so_far + after
     }
 }
