@@ -10,6 +10,11 @@
 //! costs what it costs at once. A critic that sees what the policy sees learns how much it goes on to lose, and advantages
 //! look some slots ahead (Schulman et al. 2016).
 //!
+//! The planner searches by chance, and what it finds late was there to be had before. Paid as it is found, three
+//! quarters of the payments' variance would be the search's. So payments look back: what was to be had at a slot is the
+//! best of what was seen then and of what the flight then brought and was seen to be had later. No slot gains that way; it
+//! loses, or it does not.
+//!
 //! What a policy is sure of it never tries otherwise, and the critic expects the loss: where it is wrong and sure, policy
 //! gradients are blind. So policies kept flying over their base by accident, which ends a mission. The planner has
 //! seen what that move lost: it makes the move itself less likely, the more the surer the policy was (unlikelihood,
@@ -101,8 +106,10 @@ struct Experience {
     log_probability: f32,
     /// Whether the planner chose it.
     prompted: bool,
-    /// What the slot brought and what it changed of what is still to be had, utility.
-    gain: f32,
+    /// What the slot brought, utility.
+    brought: f32,
+    /// What the planner saw to be had before and after it, utility.
+    ahead: [f32; 2],
     /// What the critic expected of the gains from here on.
     value: f32,
     over: bool,
@@ -342,10 +349,22 @@ impl Refinement {
                 let mask = going.mask();
                 let policy = Distribution::new(&logits, mask);
                 let (action, prompted) = going.prompt(policy.pick(unit), &policy);
-                let gain = going.step(going.meant(action));
+                let before = going.ahead;
+                let brought = going.step(going.meant(action));
+                let ahead = [before, going.ahead];
                 let over = going.flight.is_over();
                 let log_probability = policy.log_probability[action.index()];
-                flown.push(Experience { sample, mask, action, log_probability, prompted, gain, value, over });
+                flown.push(Experience {
+                    sample,
+                    mask,
+                    action,
+                    log_probability,
+                    prompted,
+                    brought,
+                    ahead,
+                    value,
+                    over,
+                });
                 if over {
                     *going = missions.begin(going.mission + FLIGHTS)?;
                 }
@@ -545,13 +564,13 @@ impl Going {
             && self.ahead - self.prospect.value_with(&self.flight, picked, &mut self.chance) > WORTH_A_PROMPT
     }
 
-    /// Flies a slot; gives what it gained.
+    /// Flies a slot; gives what it brought, utility.
     fn step(&mut self, action: Action) -> f32 {
         self.actions.push(action.index() as u8);
         let [data, energy] = self.flight.step(action);
         let w_data = self.flight.preference().w_data().min(THRIFT);
-        let before = std::mem::replace(&mut self.ahead, self.prospect.value(&self.flight));
-        w_data * data + (1.0 - w_data) * energy + self.ahead - before
+        self.ahead = self.prospect.value(&self.flight);
+        w_data * data + (1.0 - w_data) * energy
     }
 }
 
@@ -574,11 +593,18 @@ struct Lesson {
 fn judge(experiences: Vec<Experience>, ahead: f32) -> Vec<Lesson> {
     let mut lessons = Vec::with_capacity(experiences.len());
     let (mut next_value, mut next_advantage) = (ahead, 0.0);
+    let mut had_next = f32::NEG_INFINITY;
     for experience in experiences.into_iter().rev() {
         if experience.over {
             (next_value, next_advantage) = (0.0, 0.0);
+            had_next = 0.0;
         }
-        let advantage = experience.gain + next_value - experience.value + TRACE * next_advantage;
+        // What was to be had from here on, and how much of it is left after this slot.
+        let left = experience.brought + had_next.max(experience.ahead[1]);
+        let had = left.max(experience.ahead[0]);
+        let gain = left - had;
+        had_next = had;
+        let advantage = gain + next_value - experience.value + TRACE * next_advantage;
         lessons.push(Lesson {
             sample: experience.sample,
             mask: experience.mask,
@@ -587,7 +613,7 @@ fn judge(experiences: Vec<Experience>, ahead: f32) -> Vec<Lesson> {
             prompted: experience.prompted,
             advantage,
             gained: advantage + experience.value,
-            lost: if experience.over { (-experience.gain - NOISE).max(0.0) } else { 0.0 },
+            lost: if experience.over { (-gain - NOISE).max(0.0) } else { 0.0 },
         });
         // What came of a prompt is no merit of what the policy did before.
         let is_merit = !experience.prompted;
@@ -715,6 +741,44 @@ mod tests {
         lesson.unlearn(&Distribution::new(&sure, mask), &mut gradient);
         assert!(gradient[Action::East.index()] > 2.99 * UNLIKELIHOOD, "{gradient:?}");
         assert!(gradient.iter().sum::<f32>().abs() < 1e-4);
+    }
+
+    fn slot(brought: f32, before: f32, after: f32) -> Experience {
+        Experience {
+            sample: Sample::default(),
+            mask: ActionMask::FULL,
+            action: Action::Hover,
+            log_probability: 0.0,
+            prompted: false,
+            brought,
+            ahead: [before, after],
+            value: 0.0,
+            over: false,
+        }
+    }
+
+    /// What the slots gain: with a critic that knows nothing, the trace taken out of the advantages again.
+    fn gains(experiences: Vec<Experience>) -> Vec<f32> {
+        let mut next = 0.0;
+        let gain =
+            |lesson: &Lesson| lesson.advantage - TRACE * std::mem::replace(&mut next, lesson.advantage);
+        judge(experiences, 0.0).iter().map(gain).collect::<Vec<_>>().into_iter().rev().collect()
+    }
+
+    #[test]
+    fn what_the_search_finds_late_was_there_to_be_had_before() {
+        // It finds 4 more while the second slot is flown: the first has not lost the 1 that it seemed to.
+        assert_eq!(gains(vec![slot(2.0, 10.0, 7.0), slot(3.0, 7.0, 8.0)]), [0.0, 0.0]);
+        // A loss is a loss where it was made, and only there.
+        assert_eq!(
+            gains(vec![slot(2.0, 10.0, 8.0), slot(1.0, 8.0, 3.0), slot(1.0, 3.0, 2.0)]),
+            [0.0, -4.0, 0.0]
+        );
+        // Part of what seemed lost was only not found.
+        assert_eq!(gains(vec![slot(2.0, 10.0, 5.0), slot(2.0, 5.0, 4.0)]), [-2.0, 0.0]);
+        // What the next mission finds says nothing about the one before.
+        let over = Experience { over: true, ..slot(1.0, 6.0, 0.0) };
+        assert_eq!(gains(vec![over, slot(2.0, 50.0, 48.0)]), [-5.0, 0.0]);
     }
 
     #[test]

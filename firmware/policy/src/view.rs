@@ -1,8 +1,8 @@
 //! The symmetries of the grid: a situation may be turned and mirrored, and the best action turns with it.
 //!
-//! North is nothing special to a policy that sees offsets and what is heard around it. So each decision is taken eight
-//! times, of the situation as it is and as it looks turned and mirrored, and the logits are averaged: what the network
-//! has learned by accident for one direction only cancels out, and a policy flies to the north as well as to the east.
+//! North is nothing special to a policy that sees offsets and what is heard around it. So the trainer shows it missions
+//! turned and mirrored, and it learns to fly to the north what it has flown to the east. In flight there is one view, the
+//! plain one.
 
 use gleaner_units::Action;
 
