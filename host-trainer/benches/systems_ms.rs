@@ -6,6 +6,7 @@ mod processor;
 
 use clap::Parser;
 use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learning::Learning;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::train::Run;
 use processor::cpu_ms;

@@ -256,7 +256,7 @@ mod tests {
         let (mut rest, mut events) = (&bytes[..], Vec::new());
         let unmasked = |four: &[u8]| {
             let masked = u32::from_le_bytes(four.try_into().unwrap()).wrapping_sub(0xa282_ead8);
-            (masked >> 17) | (masked << 15)
+            masked.rotate_left(15)
         };
         while !rest.is_empty() {
             let length = u64::from_le_bytes(rest[..8].try_into().unwrap()) as usize;

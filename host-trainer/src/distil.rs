@@ -12,13 +12,14 @@
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::{DeciderError, Network};
 use crate::flight::Flight;
+use crate::learning::{Learning, Pace};
 use crate::mosac::Distribution;
 use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
 use crate::observation::Observation;
 use crate::settings::Settings;
 use crate::system::System;
 use crate::teacher::{Course, Teacher};
-use crate::train::{Learned, TrainError, Validation};
+use crate::train::{Learned, Tables, TrainError, Validation};
 use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::{Realization, ScenarioKind, World};
@@ -26,6 +27,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -51,6 +53,19 @@ struct Lesson {
     mask: ActionMask,
     /// Probability of each action.
     taught: [f32; Action::COUNT],
+}
+
+/// What an update tells.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CrossEntropy {
+    /// Of the teacher's distribution under the masked policy, nats.
+    pub cross_entropy: f32,
+}
+
+impl fmt::Display for CrossEntropy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "cross entropy {:.4}", self.cross_entropy)
+    }
 }
 
 /// A run of distillation.
@@ -185,37 +200,6 @@ impl Distillation {
         Ok((flight, self.teacher.study(&mission.realization)))
     }
 
-    /// Updates done.
-    #[must_use]
-    pub const fn update(&self) -> u64 {
-        self.kept.update
-    }
-
-    /// Whether the settings ask for no more updates.
-    #[must_use]
-    pub const fn is_done(&self) -> bool {
-        self.kept.update >= self.settings.updates
-    }
-
-    /// One slot of every flight, if lessons are due, and one update. Gives the cross entropy, nats.
-    ///
-    /// # Errors
-    /// No mission could be drawn.
-    pub fn advance(&mut self) -> Result<f32, TrainError> {
-        while self.kept.lessons.len() < WARM_UP || self.shortest.is_empty() {
-            self.fly()?;
-        }
-        // As many slots per update as the settings say, in rounds of all flights.
-        if self.kept.update % (FLIGHTS / self.settings.steps_per_update).max(1) as u64 == 0 {
-            self.fly()?;
-        }
-        let loss = self.learn();
-        self.kept.update += 1;
-        let share = AVERAGING.max(1.0 / self.kept.update as f32);
-        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
-        Ok(loss)
-    }
-
     /// Every flight is shown to the teacher; the learner, or at first the teacher, decides.
     fn fly(&mut self) -> Result<(), TrainError> {
         let seen: Vec<Observation> = self.flights.iter().map(|(flight, _)| flight.observe()).collect();
@@ -323,12 +307,42 @@ impl Distillation {
         self.kept.adam.step(&mut self.kept.actor, &self.gradients);
         loss
     }
+}
 
-    /// Judges the averaged actor, and offers it to `best`.
-    ///
-    /// # Errors
-    /// The network's answer is not a number.
-    pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<crate::train::Tables, TrainError> {
+impl Learning for Distillation {
+    type Losses = CrossEntropy;
+    const PACE: Pace = Pace::QUICK;
+
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn update(&self) -> u64 {
+        self.kept.update
+    }
+
+    fn steps(&self) -> u64 {
+        self.kept.steps
+    }
+
+    /// Flies one slot of every flight if lessons are due.
+    fn advance(&mut self) -> Result<CrossEntropy, TrainError> {
+        while self.kept.lessons.len() < WARM_UP || self.shortest.is_empty() {
+            self.fly()?;
+        }
+        // As many slots per update as the settings say, in rounds of all flights.
+        let every = (FLIGHTS / self.settings.steps_per_update).max(1);
+        if self.kept.update.is_multiple_of(every as u64) {
+            self.fly()?;
+        }
+        let cross_entropy = self.learn();
+        self.kept.update += 1;
+        let share = AVERAGING.max(1.0 / self.kept.update as f32);
+        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
+        Ok(CrossEntropy { cross_entropy })
+    }
+
+    fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let candidate = Learned {
             system: System::Gleaner,
             method: self.method.clone(),
@@ -341,11 +355,7 @@ impl Distillation {
         Ok(self.validation.examine(&self.world, candidate, best)?)
     }
 
-    /// Writes the checkpoint.
-    ///
-    /// # Errors
-    /// The disk; the last good checkpoint is then still there.
-    pub fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
+    fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
         self.kept.rng_word = self.rng.get_word_pos();
         checkpoint::save(&folder.join(CHECKPOINT), &self.kept)
     }

@@ -32,6 +32,7 @@ pub mod flight;
 pub mod greedy;
 pub mod learned;
 pub mod learner;
+pub mod learning;
 pub mod maps;
 pub mod mosac;
 pub mod net;

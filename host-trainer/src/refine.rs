@@ -30,6 +30,7 @@
 use crate::checkpoint::{self, CheckpointError};
 use crate::evaluation::Network;
 use crate::flight::Flight;
+use crate::learning::{Learning, Pace};
 use crate::mosac::Distribution;
 use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
 use crate::planner::{Prospect, THRIFT};
@@ -44,6 +45,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -132,6 +134,13 @@ pub struct Findings {
     pub entropy: f32,
     /// How far the policy has moved from what was flown, nats.
     pub divergence: f32,
+}
+
+impl fmt::Display for Findings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Findings { critic, entropy, divergence } = self;
+        write!(f, "critic {critic:.4}  entropy {entropy:.3}  divergence {divergence:.4}")
+    }
 }
 
 /// A flight in the air, and how it came there.
@@ -292,42 +301,6 @@ impl Refinement {
         Ok(run)
     }
 
-    /// Updates done.
-    #[must_use]
-    pub const fn update(&self) -> u64 {
-        self.kept.update
-    }
-
-    /// Whether the settings ask for no more updates.
-    #[must_use]
-    pub const fn is_done(&self) -> bool {
-        self.kept.update >= self.missions.settings.updates
-    }
-
-    /// Flies every mission for some slots, and learns from it.
-    ///
-    /// # Errors
-    /// No mission could be drawn.
-    pub fn advance(&mut self) -> Result<Findings, TrainError> {
-        let mut flown: Vec<Vec<Experience>> =
-            self.flights.iter().map(|_| Vec::with_capacity(SLOTS)).collect();
-        for _ in 0..SLOTS {
-            self.fly(&mut flown)?;
-        }
-        let samples = self.see();
-        let ahead = values(&self.kept.critic, &mut self.desks[1], &samples);
-        let mut lessons = Vec::with_capacity(flown.len() * SLOTS);
-        for (experiences, ahead) in flown.into_iter().zip(ahead) {
-            lessons.extend(judge(experiences, ahead));
-        }
-        even_out(&mut lessons);
-        let findings = self.learn(&lessons);
-        self.kept.update += 1;
-        let share = AVERAGING.max(1.0 / self.kept.update as f32);
-        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
-        Ok(findings)
-    }
-
     fn see(&self) -> Vec<Sample> {
         self.flights.par_iter().map(Going::sees).collect()
     }
@@ -407,14 +380,6 @@ impl Refinement {
         Findings { critic: judging / count, entropy, divergence }
     }
 
-    /// Judges the averaged actor, and offers it to `best`.
-    ///
-    /// # Errors
-    /// The network's answer is not a number.
-    pub fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
-        Ok(self.validation.examine(&self.world, self.last(), best)?)
-    }
-
     /// The averaged actor as it stands.
     #[must_use]
     pub fn last(&self) -> Learned {
@@ -428,12 +393,51 @@ impl Refinement {
             score: f64::NEG_INFINITY,
         }
     }
+}
 
-    /// Writes everything that the next update depends on, and the policy as it stands to [`LAST`].
-    ///
-    /// # Errors
-    /// The disk; the last good checkpoint is then still there.
-    pub fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
+impl Learning for Refinement {
+    type Losses = Findings;
+    const PACE: Pace = Pace::SLOW;
+
+    fn settings(&self) -> &Settings {
+        &self.missions.settings
+    }
+
+    fn update(&self) -> u64 {
+        self.kept.update
+    }
+
+    fn steps(&self) -> u64 {
+        self.kept.steps
+    }
+
+    /// Flies every mission for some slots, and learns from it.
+    fn advance(&mut self) -> Result<Findings, TrainError> {
+        let mut flown: Vec<Vec<Experience>> =
+            self.flights.iter().map(|_| Vec::with_capacity(SLOTS)).collect();
+        for _ in 0..SLOTS {
+            self.fly(&mut flown)?;
+        }
+        let samples = self.see();
+        let ahead = values(&self.kept.critic, &mut self.desks[1], &samples);
+        let mut lessons = Vec::with_capacity(flown.len() * SLOTS);
+        for (experiences, ahead) in flown.into_iter().zip(ahead) {
+            lessons.extend(judge(experiences, ahead));
+        }
+        even_out(&mut lessons);
+        let findings = self.learn(&lessons);
+        self.kept.update += 1;
+        let share = AVERAGING.max(1.0 / self.kept.update as f32);
+        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
+        Ok(findings)
+    }
+
+    fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
+        Ok(self.validation.examine(&self.world, self.last(), best)?)
+    }
+
+    /// Writes the policy as it stands to [`LAST`], too.
+    fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
         self.kept.rng_word = self.rng.get_word_pos();
         let begun = |going: &Going| Begun {
             mission: going.mission,

@@ -7,6 +7,7 @@ use crate::flight::{Flight, Reward};
 use crate::greedy::Greedy;
 use crate::learned::Trained;
 use crate::learner::{ACTIONS, Asked, Learner};
+use crate::learning::{Learning, Pace};
 use crate::mosac::Distribution;
 use crate::net;
 use crate::replay::{Replay, Transition};
@@ -61,19 +62,6 @@ pub enum TrainError {
         /// Whose run it is.
         found: System,
     },
-}
-
-/// What a run tells while it goes on: one line of the learning curve.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Progress<L> {
-    /// Updates done.
-    pub update: u64,
-    /// Slots flown.
-    pub steps: u64,
-    /// Of the last update.
-    pub losses: L,
-    /// On the validation realizations.
-    pub tables: Tables,
 }
 
 /// The remembered transitions of a learner.
@@ -217,47 +205,6 @@ impl<L: Learner> Run<L> {
         self.begin(mission)
     }
 
-    /// Updates done.
-    #[must_use]
-    pub const fn update(&self) -> u64 {
-        self.update
-    }
-
-    /// Whether the settings ask for no more updates.
-    #[must_use]
-    pub const fn is_done(&self) -> bool {
-        self.update >= self.settings.updates
-    }
-
-    /// One update of the networks, after as many slots as the settings say. Fills the memory first.
-    ///
-    /// # Errors
-    /// No mission could be drawn.
-    pub fn advance(&mut self) -> Result<L::Losses, TrainError> {
-        while self.replay.len() < self.settings.warm_up.min(self.settings.replay) {
-            self.fly(true)?;
-        }
-        self.fly(false)?;
-        let transitions = self.replay.sample(self.settings.batch, &mut self.rng);
-        let preferences: Vec<_> = (0..self.settings.batch * self.settings.preferences)
-            .map(|_| {
-                // The corners are a null set of the uniform distribution, and what operators use most.
-                match self.rng.random_range(0..20) {
-                    0 => gleaner_policy::Preference::DATA,
-                    1 => gleaner_policy::Preference::ENERGY,
-                    _ => random_preference(&mut self.rng),
-                }
-            })
-            .collect();
-        let losses =
-            self.learner.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
-        self.update += 1;
-        // A plain mean at first, so that the untrained start is soon forgotten.
-        let share = AVERAGING.max(1.0 / self.update as f32);
-        net::polyak(&mut self.averaged, self.learner.deciding(), share);
-        Ok(losses)
-    }
-
     /// One slot of every flight, explored as the learner does.
     fn fly(&mut self, uniform: bool) -> Result<(), TrainError> {
         let observations: Vec<_> =
@@ -294,16 +241,51 @@ impl<L: Learner> Run<L> {
         let answers = answers.chunks_exact(answers.len() / observations.len());
         answers.zip(preferences).map(|(answer, preference)| L::scores(answer, preference)).collect()
     }
+}
 
-    /// Judges the averaged network on the validation realizations, and puts it into `best` if it is better.
-    ///
-    /// # Errors
-    /// The network's answer is not a number: the run diverged.
-    pub fn validate(
-        &self,
-        losses: L::Losses,
-        best: &mut Option<Learned>,
-    ) -> Result<Progress<L::Losses>, TrainError> {
+impl<L: Learner> Learning for Run<L> {
+    type Losses = L::Losses;
+    const PACE: Pace = Pace::QUICK;
+
+    fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    fn update(&self) -> u64 {
+        self.update
+    }
+
+    fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Fills the memory first, then flies as many slots per update as the settings say.
+    fn advance(&mut self) -> Result<L::Losses, TrainError> {
+        while self.replay.len() < self.settings.warm_up.min(self.settings.replay) {
+            self.fly(true)?;
+        }
+        self.fly(false)?;
+        let transitions = self.replay.sample(self.settings.batch, &mut self.rng);
+        let preferences: Vec<_> = (0..self.settings.batch * self.settings.preferences)
+            .map(|_| {
+                // The corners are a null set of the uniform distribution, and what operators use most.
+                match self.rng.random_range(0..20) {
+                    0 => gleaner_policy::Preference::DATA,
+                    1 => gleaner_policy::Preference::ENERGY,
+                    _ => random_preference(&mut self.rng),
+                }
+            })
+            .collect();
+        let losses =
+            self.learner.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
+        self.update += 1;
+        // A plain mean at first, so that the untrained start is soon forgotten.
+        let share = AVERAGING.max(1.0 / self.update as f32);
+        net::polyak(&mut self.averaged, self.learner.deciding(), share);
+        Ok(losses)
+    }
+
+    fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let tables = self.validation.tables(&self.world, &mut Trained::<L>::new(&self.averaged))?;
         Learned {
             system: L::SYSTEM,
@@ -315,14 +297,10 @@ impl<L: Learner> Run<L> {
             score: tables.score(),
         }
         .offer(best);
-        Ok(Progress { update: self.update, steps: self.steps, losses, tables })
+        Ok(tables)
     }
 
-    /// Writes everything that the next update depends on.
-    ///
-    /// # Errors
-    /// The disk; the last good checkpoint is then still there.
-    pub fn save(&self, folder: &Path) -> Result<(), TrainError> {
+    fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
         let stored = Stored {
             settings: &self.settings,
             learner: &self.learner,
@@ -335,7 +313,7 @@ impl<L: Learner> Run<L> {
             steps: self.steps,
             averaged: self.averaged.clone(),
         };
-        Ok(checkpoint::save_named(&folder.join(CHECKPOINT), L::SYSTEM.name(), &stored)?)
+        checkpoint::save_named(&folder.join(CHECKPOINT), L::SYSTEM.name(), &stored)
     }
 }
 

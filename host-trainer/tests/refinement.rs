@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use gleaner_host_trainer::learned::Learned;
+use gleaner_host_trainer::learning::Learning;
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::refine::{LAST, Refinement};
 use gleaner_host_trainer::settings::Settings;

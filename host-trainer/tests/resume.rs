@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learning::Learning;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::{CHECKPOINT, Run, TrainError};
@@ -68,7 +69,7 @@ fn a_folder_with_a_run_of_another_system_is_refused() {
 #[test]
 fn a_folder_with_another_run_is_refused_and_a_longer_run_is_not() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Run::<Gleaner>::open(settings(&[]), folder.path()).unwrap();
+    let mut run = Run::<Gleaner>::open(settings(&[]), folder.path()).unwrap();
     run.save(folder.path()).unwrap();
     let error = Run::<Gleaner>::open(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
     assert!(matches!(error, TrainError::OtherSettings { .. }), "{error}");

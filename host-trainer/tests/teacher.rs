@@ -5,6 +5,7 @@ use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::evaluation::{Network, evaluate_greedy, realizations};
 use gleaner_host_trainer::flight::Flight;
 use gleaner_host_trainer::learned::Learned;
+use gleaner_host_trainer::learning::Learning;
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
@@ -57,7 +58,7 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
     let settings = Command::parse_from(words).settings;
     let folder = tempfile::tempdir().unwrap();
     let mut run = Distillation::open(settings.clone(), folder.path(), None, Vec::new()).unwrap();
-    let first = run.advance().unwrap();
+    let first = run.advance().unwrap().cross_entropy;
     assert!(first < (Action::COUNT as f32).ln() * 1.2, "an untrained policy is near uniform: {first}");
     while run.update() < 200 {
         run.advance().unwrap();
@@ -68,7 +69,7 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
     assert_eq!(run.update(), 200);
     let mut last = 0.0;
     while !run.is_done() {
-        last += run.advance().unwrap() / 100.0;
+        last += run.advance().unwrap().cross_entropy / 100.0;
     }
     assert!(last < 0.75 * first, "cross entropy {first} before, {last} after 300 updates");
 }
@@ -106,7 +107,7 @@ fn a_pupil_of_its_own_views_is_of_one_mind() {
     let mentors = vec![mentor.clone()];
     let mut run = Distillation::open(settings, folder.path(), Some(&mentor), mentors).unwrap();
     while !run.is_done() {
-        assert!(run.advance().unwrap().is_finite());
+        assert!(run.advance().unwrap().cross_entropy.is_finite());
     }
     run.validate(&mut best).unwrap();
     let pupil = best.unwrap();

@@ -56,7 +56,7 @@ pub struct Engine {
 
 enum Run {
     Tract(Box<TractPolicy>),
-    Native(NativePolicy<'static>),
+    Native(Box<NativePolicy<'static>>),
 }
 
 impl Engine {
@@ -103,7 +103,7 @@ impl Engine {
             sha256: model.source().iter().map(|byte| format!("{byte:02x}")).collect(),
             card,
             goldens: model.goldens().collect(),
-            run: Run::Native(policy),
+            run: Run::Native(Box::new(policy)),
         })
     }
 

@@ -16,19 +16,20 @@ pub struct View {
 
 impl View {
     /// All of them; the first changes nothing.
-    pub const ALL: [View; 8] = {
-        let mut all = [View { mirrors_east: false, mirrors_north: false, exchanges: false }; 8];
-        let mut index = 0;
-        while index < all.len() {
-            all[index] = View {
-                mirrors_east: index & 1 != 0,
-                mirrors_north: index & 2 != 0,
-                exchanges: index & 4 != 0,
-            };
-            index += 1;
-        }
-        all
-    };
+    pub const ALL: [View; 8] = [
+        View::numbered(0),
+        View::numbered(1),
+        View::numbered(2),
+        View::numbered(3),
+        View::numbered(4),
+        View::numbered(5),
+        View::numbered(6),
+        View::numbered(7),
+    ];
+
+    const fn numbered(bits: u8) -> View {
+        View { mirrors_east: bits & 1 != 0, mirrors_north: bits & 2 != 0, exchanges: bits & 4 != 0 }
+    }
 
     /// Where this offset (east, north) lies in the view.
     #[must_use]

@@ -145,13 +145,13 @@ mod tests {
 
     #[test]
     fn the_table_is_the_formula() {
-        for index in 1..63 {
+        for (index, &entry) in UNITS_PER_SLOT.iter().enumerate().take(63).skip(1) {
             let distance_m2 = index as f32 * TABLE_STEP_M2;
             let snr_db = 66.0 - 12.5 * libm::log10f(distance_m2);
             assert!(snr_db >= 5.0, "entry {index}");
             let units = 100.0 * libm::log2f(1.0 + libm::exp10f(0.1 * snr_db));
-            assert!((units - f32::from(UNITS_PER_SLOT[index])).abs() <= 0.6, "entry {index}: {units}");
-            assert_eq!(units_per_slot(distance_m2), f32::from(UNITS_PER_SLOT[index]));
+            assert!((units - f32::from(entry)).abs() <= 0.6, "entry {index}: {units}");
+            assert_eq!(units_per_slot(distance_m2), f32::from(entry));
         }
         // The last entry ends the table.
         assert!(units_per_slot(62.99 * TABLE_STEP_M2) > 205.0);

@@ -15,8 +15,7 @@ impl<const PLACES: usize> fmt::Display for Decimal<PLACES> {
         const { assert!(PLACES <= 3) };
         let scale = const { 10_u64.pow(PLACES as u32) };
         let scaled = libm::rint(f64::from(self.0).abs() * scale as f64);
-        // Written so that NaN is a dash.
-        if !(scaled < 1e12) {
+        if scaled.is_nan() || scaled >= 1e12 {
             return f.write_str("-");
         }
         let scaled = scaled as u64;

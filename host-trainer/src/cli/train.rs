@@ -1,34 +1,33 @@
-//! `gleaner-train train` and `gleaner-train distil`.
+//! `gleaner-train train`, `distil` and `refine`: three ways of learning, one loop.
 
 use super::learned_of;
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::curves::{Curves, scalars_in};
 use gleaner_host_trainer::distil::Distillation;
 use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learning::Learning;
 use gleaner_host_trainer::refine::Refinement;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::{Learned, Run, Tables};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
+use std::fmt::Display;
 use std::fs;
 use std::io::IsTerminal;
 use std::path::PathBuf;
-
-/// Updates between two points of the losses in the learning curve.
-const LOSSES_EVERY: u64 = 250;
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// Folder of the run: checkpoint and learning curve.
     #[arg(long)]
     out: PathBuf,
-    /// Updates between two checkpoints: what a kill can cost.
-    #[arg(long, default_value_t = 2_500)]
-    checkpoint_every: u64,
-    /// Updates between two points of the learning curve.
-    #[arg(long, default_value_t = 5_000)]
-    validate_every: u64,
+    /// Updates between two checkpoints: what a kill can cost [default: 2500, refine: 25]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    checkpoint_every: Option<u64>,
+    /// Updates between two validations [default: 5000, refine: 100]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    validate_every: Option<u64>,
     #[command(flatten)]
     settings: Settings,
 }
@@ -87,83 +86,27 @@ pub fn run(arguments: &TrainArguments) -> Result<()> {
 }
 
 fn by_trial<L: Learner>(arguments: &Arguments) -> Result<()> {
-    let mut desk = Desk::open(L::SYSTEM, arguments)?;
-    let mut run = Run::<L>::open(arguments.settings.clone(), &arguments.out)?;
-    desk.begin(run.update())?;
-    while !run.is_done() {
-        let losses = run.advance()?;
-        desk.bar.set_position(run.update());
-        desk.note(run.update(), &losses)?;
-        if desk.validation_is_due(run.update()) {
-            let told = losses.to_string();
-            let progress = run.validate(losses, &mut desk.best)?;
-            desk.report(&serde_json::to_value(&progress)?, run.update(), &told, &progress.tables)?;
-        }
-        if desk.checkpoint_is_due(run.update()) {
-            run.save(&arguments.out)?;
-        }
-    }
-    desk.end();
-    Ok(())
+    Desk::open(L::SYSTEM, arguments)?.learn(Run::<L>::open(arguments.settings.clone(), &arguments.out)?)
 }
 
 /// Learns from the planner: distillation.
 pub fn distil(arguments: &DistilArguments) -> Result<()> {
-    let from = arguments.from.as_deref().map(|folder| learned_of(System::Gleaner, folder)).transpose()?;
-    let mentors = arguments.mentor.iter().map(|folder| learned_of(System::Gleaner, folder));
+    let DistilArguments { from, mentor, usual } = arguments;
+    let from = from.as_deref().map(|folder| learned_of(System::Gleaner, folder)).transpose()?;
+    let mentors = mentor.iter().map(|folder| learned_of(System::Gleaner, folder));
     let mentors = mentors.collect::<Result<Vec<_>>>()?;
-    let arguments = &arguments.usual;
-    let mut desk = Desk::open(System::Gleaner, arguments)?;
-    let mut run = Distillation::open(arguments.settings.clone(), &arguments.out, from.as_ref(), mentors)?;
-    desk.begin(run.update())?;
-    while !run.is_done() {
-        let cross_entropy = run.advance()?;
-        desk.bar.set_position(run.update());
-        desk.note(run.update(), &serde_json::json!({ "cross_entropy": cross_entropy }))?;
-        if desk.validation_is_due(run.update()) {
-            let tables = run.validate(&mut desk.best)?;
-            let line = serde_json::json!({
-                "update": run.update(), "cross_entropy": cross_entropy, "tables": &tables,
-            });
-            desk.report(&line, run.update(), &format!("cross entropy {cross_entropy:.4}"), &tables)?;
-        }
-        if desk.checkpoint_is_due(run.update()) {
-            run.save(&arguments.out)?;
-        }
-    }
-    desk.end();
-    Ok(())
+    let desk = Desk::open(System::Gleaner, usual)?;
+    desk.learn(Distillation::open(usual.settings.clone(), &usual.out, from.as_ref(), mentors)?)
 }
 
 /// Learns from its own flights: refinement.
 pub fn refine(arguments: &RefineArguments) -> Result<()> {
-    let from = arguments.from.iter().map(|folder| learned_of(System::Gleaner, folder));
+    let RefineArguments { from, confidence, usual } = arguments;
+    let from = from.iter().map(|folder| learned_of(System::Gleaner, folder));
     let from = from.collect::<Result<Vec<_>>>()?;
     let [first, others @ ..] = &from[..] else { bail!("--from: name a run") };
-    let confidence = arguments.confidence;
-    let arguments = &arguments.usual;
-    let mut desk = Desk::open(System::Gleaner, arguments)?;
-    let mut run = Refinement::open(arguments.settings.clone(), &arguments.out, first, others, confidence)?;
-    desk.begin(run.update())?;
-    while !run.is_done() {
-        let findings = run.advance()?;
-        desk.note(run.update(), &findings)?;
-        desk.bar.set_position(run.update());
-        if desk.validation_is_due(run.update()) {
-            let tables = run.validate(&mut desk.best)?;
-            let line = serde_json::json!({ "update": run.update(), "losses": findings, "tables": &tables });
-            let of_losses = format!(
-                "critic {:.4}  entropy {:.3}  divergence {:.4}",
-                findings.critic, findings.entropy, findings.divergence
-            );
-            desk.report(&line, run.update(), &of_losses, &tables)?;
-        }
-        if desk.checkpoint_is_due(run.update()) {
-            run.save(&arguments.out)?;
-        }
-    }
-    desk.end();
-    Ok(())
+    let desk = Desk::open(System::Gleaner, usual)?;
+    desk.learn(Refinement::open(usual.settings.clone(), &usual.out, first, others, *confidence)?)
 }
 
 /// What all ways of learning show and leave in the folder.
@@ -187,19 +130,31 @@ impl<'a> Desk<'a> {
         Ok(Desk { system, arguments, bar: bar(arguments.settings.updates), curves: None, best })
     }
 
-    /// The learning curve goes on from where the run goes on.
-    fn begin(&mut self, update: u64) -> Result<()> {
-        self.curves = Some(Curves::open(&self.arguments.out, update)?);
-        self.bar.set_position(update);
+    /// The loop: updates, and from time to time a point of the curve, a validation, a checkpoint.
+    fn learn<L: Learning>(mut self, mut run: L) -> Result<()> {
+        // The learning curve goes on from where the run goes on.
+        self.curves = Some(Curves::open(&self.arguments.out, run.update())?);
+        self.bar.set_position(run.update());
         self.bar.reset_eta();
-        Ok(())
-    }
-
-    /// The losses, often enough to watch them fall.
-    fn note(&mut self, update: u64, losses: &impl Serialize) -> Result<()> {
-        if update.is_multiple_of(LOSSES_EVERY) {
-            self.log(update, &serde_json::to_value(losses)?)?;
+        let last = self.arguments.settings.updates;
+        let is_due = |update: u64, every: u64| update.is_multiple_of(every) || update == last;
+        while !run.is_done() {
+            let losses = run.advance()?;
+            let update = run.update();
+            self.bar.set_position(update);
+            if update.is_multiple_of(L::PACE.losses) {
+                self.bar.set_message(losses.to_string());
+                self.log(update, &serde_json::to_value(&losses)?)?;
+            }
+            if is_due(update, self.arguments.validate_every.unwrap_or(L::PACE.validation)) {
+                let tables = run.validate(&mut self.best)?;
+                self.report(update, run.steps(), &losses, &tables)?;
+            }
+            if is_due(update, self.arguments.checkpoint_every.unwrap_or(L::PACE.checkpoint)) {
+                run.save(&self.arguments.out)?;
+            }
         }
+        self.end();
         Ok(())
     }
 
@@ -208,23 +163,15 @@ impl<'a> Desk<'a> {
         self.curves.as_mut().map_or(Ok(()), |curves| Ok(curves.log(update, &scalars)?))
     }
 
-    fn validation_is_due(&self, update: u64) -> bool {
-        update.is_multiple_of(self.arguments.validate_every) || update == self.arguments.settings.updates
-    }
-
-    fn checkpoint_is_due(&self, update: u64) -> bool {
-        update.is_multiple_of(self.arguments.checkpoint_every) || update == self.arguments.settings.updates
-    }
-
     /// One point of the curve and one line for people, whether or not anyone watches the bar; keeps the best.
     fn report(
         &mut self,
-        curve: &serde_json::Value,
         update: u64,
-        losses: &str,
+        steps: u64,
+        losses: &(impl Serialize + Display),
         tables: &Tables,
     ) -> Result<()> {
-        self.log(update, curve)?;
+        self.log(update, &serde_json::json!({ "steps": steps, "losses": losses, "tables": tables }))?;
         if let Some(best) = self.best.as_ref().filter(|best| best.update == update) {
             best.save(&self.arguments.out)?;
         }
@@ -257,7 +204,7 @@ impl<'a> Desk<'a> {
 }
 
 fn bar(updates: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} updates, {per_sec}, {eta} left");
+    let style = ProgressStyle::with_template("{bar:30} {pos}/{len} updates, {per_sec}, {eta} left  {msg}");
     let bar = ProgressBar::new(updates);
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar

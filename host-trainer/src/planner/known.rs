@@ -64,9 +64,10 @@ impl Rates {
         }
         let mut busyness = 0.0;
         let busyness = from
-            .array_windows()
-            .map(|&[here, next]| {
-                let heard: f32 = audible[here as usize..next as usize].iter().map(|link| link.units).sum();
+            .windows(2)
+            .map(|ends| {
+                let heard: f32 =
+                    audible[ends[0] as usize..ends[1] as usize].iter().map(|link| link.units).sum();
                 busyness += heard * heard;
                 busyness
             })

@@ -218,6 +218,6 @@ mod tests {
         assert_eq!(field("GREEDY"), "GREEDY");
         let lines = published();
         assert_eq!(lines.lines().count(), CITATIONS.len() + 1);
-        assert!(lines.contains("\nbattery at w") == false && lines.contains("\n\"battery at w = (0, 1), RD"));
+        assert!(!lines.contains("\nbattery at w") && lines.contains("\n\"battery at w = (0, 1), RD"));
     }
 }

@@ -111,7 +111,7 @@ impl NorFlash for Double {
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerGone> {
-        assert!(offset as usize % WORD == 0 && bytes.len() % WORD == 0, "whole words");
+        assert!((offset as usize).is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "whole words");
         let mut chip = self.0.borrow_mut();
         for (index, word) in bytes.chunks(WORD).enumerate() {
             let at = offset as usize + index * WORD;
