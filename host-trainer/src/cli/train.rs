@@ -11,7 +11,6 @@ use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::train::{Learned, Run, Tables};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
 use std::fmt::Display;
 use std::fs;
 use std::io::IsTerminal;
@@ -114,7 +113,6 @@ struct Desk<'a> {
     system: System,
     arguments: &'a Arguments,
     bar: ProgressBar,
-    curves: Option<Curves>,
     best: Option<Learned>,
 }
 
@@ -127,13 +125,13 @@ impl<'a> Desk<'a> {
         let out = &arguments.out;
         fs::create_dir_all(out).with_context(|| format!("--out {}", out.display()))?;
         let best = Learned::load_of(system, out)?;
-        Ok(Desk { system, arguments, bar: bar(arguments.settings.updates), curves: None, best })
+        Ok(Desk { system, arguments, bar: bar(arguments.settings.updates), best })
     }
 
     /// The loop: updates, and from time to time a point of the curve, a validation, a checkpoint.
     fn learn<L: Learning>(mut self, mut run: L) -> Result<()> {
         // The learning curve goes on from where the run goes on.
-        self.curves = Some(Curves::open(&self.arguments.out, run.update())?);
+        let mut curves = Curves::open(&self.arguments.out, run.update())?;
         self.bar.set_position(run.update());
         self.bar.reset_eta();
         let last = self.arguments.settings.updates;
@@ -144,11 +142,13 @@ impl<'a> Desk<'a> {
             self.bar.set_position(update);
             if update.is_multiple_of(L::PACE.losses) {
                 self.bar.set_message(losses.to_string());
-                self.log(update, &serde_json::to_value(&losses)?)?;
+                curves.log(update, &scalars_in(&serde_json::to_value(&losses)?).unwrap_or_default())?;
             }
             if is_due(update, self.arguments.validate_every.unwrap_or(L::PACE.validation)) {
                 let tables = run.validate(&mut self.best)?;
-                self.report(update, run.steps(), &losses, &tables)?;
+                let point = serde_json::json!({ "steps": run.steps(), "losses": losses, "tables": tables });
+                curves.log(update, &scalars_in(&point).unwrap_or_default())?;
+                self.report(update, &losses, &tables)?;
             }
             if is_due(update, self.arguments.checkpoint_every.unwrap_or(L::PACE.checkpoint)) {
                 run.save(&self.arguments.out)?;
@@ -158,20 +158,8 @@ impl<'a> Desk<'a> {
         Ok(())
     }
 
-    fn log(&mut self, update: u64, told: &serde_json::Value) -> Result<()> {
-        let scalars = scalars_in(told).unwrap_or_default();
-        self.curves.as_mut().map_or(Ok(()), |curves| Ok(curves.log(update, &scalars)?))
-    }
-
-    /// One point of the curve and one line for people, whether or not anyone watches the bar; keeps the best.
-    fn report(
-        &mut self,
-        update: u64,
-        steps: u64,
-        losses: &(impl Serialize + Display),
-        tables: &Tables,
-    ) -> Result<()> {
-        self.log(update, &serde_json::json!({ "steps": steps, "losses": losses, "tables": tables }))?;
+    /// One line for people, whether or not anyone watches the bar; keeps the best.
+    fn report(&self, update: u64, losses: &impl Display, tables: &Tables) -> Result<()> {
         if let Some(best) = self.best.as_ref().filter(|best| best.update == update) {
             best.save(&self.arguments.out)?;
         }
