@@ -1,9 +1,10 @@
 //! A file that survives a kill: written beside the last good one, renamed over it when it is whole.
 
+use crate::whole;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -44,21 +45,9 @@ pub enum CheckpointError {
 pub fn save<T: Serialize>(path: &Path, value: &T) -> Result<(), CheckpointError> {
     let io = |source| CheckpointError::Io { path: path.to_owned(), source };
     let payload = postcard::to_stdvec(value).map_err(|error| io(io::Error::other(error)))?;
-    let temporary = path.with_extension("writing");
-    let write = || -> io::Result<()> {
-        let mut file = File::create(&temporary)?;
-        file.write_all(MAGIC)?;
-        file.write_all(&(payload.len() as u64).to_le_bytes())?;
-        file.write_all(&CRC.checksum(&payload).to_le_bytes())?;
-        file.write_all(&payload)?;
-        // On the disk before the name points to it.
-        file.sync_all()?;
-        fs::rename(&temporary, path)
-    };
-    write().map_err(|error| {
-        let _ = fs::remove_file(&temporary);
-        io(error)
-    })
+    let length = (payload.len() as u64).to_le_bytes();
+    let bytes = [MAGIC, &length[..], &CRC.checksum(&payload).to_le_bytes(), &payload].concat();
+    whole::write(path, &bytes).map_err(io)
 }
 
 /// [`save`], with the name of what the value belongs to before it.

@@ -6,6 +6,7 @@
 //! nothing twice.
 
 use crate::train::{CURVE, Tables};
+use crate::whole;
 use prost::Message;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -182,10 +183,7 @@ fn io_error(path: &Path, source: io::Error) -> CurvesError {
 }
 
 fn replace(path: &Path, bytes: &[u8]) -> Result<(), CurvesError> {
-    let temporary = path.with_extension("writing");
-    fs::write(&temporary, bytes)
-        .and_then(|()| fs::rename(&temporary, path))
-        .map_err(|error| io_error(path, error))
+    whole::write(path, bytes).map_err(|error| io_error(path, error))
 }
 
 /// One record of an event file: length, its masked checksum, the message, its masked checksum.

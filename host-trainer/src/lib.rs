@@ -54,3 +54,4 @@ pub mod teacher;
 pub mod train;
 pub mod validation;
 pub mod variety;
+pub mod whole;

@@ -29,6 +29,14 @@ pub struct OracleSetting {
     /// computed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub upper_bound_percent: Vec<f32>,
+    /// How many parts of each mission's possibilities were looked at for that.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub bound_parts: u32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+const fn is_none(count: &u32) -> bool {
+    *count == 0
 }
 
 /// How hard to look for the best tour of a mission under one preference: two searches, one of them from the best

@@ -1,12 +1,14 @@
 //! The oracle plans what can be flown, and better than anyone who knows less.
 
 use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations, test_preferences};
-use gleaner_host_trainer::oracle::{Thoroughness, consult};
+use gleaner_host_trainer::oracle::{OracleSetting, Thoroughness, consult};
 use gleaner_host_trainer::planner::{Effort, Problem, Rates, State, Tour};
 use gleaner_units::{Action, BatteryUnits};
 use gleaner_world::{Realization, ScenarioKind, Seed, World};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::fs;
+use std::process::{Command, Output};
 use std::sync::Arc;
 
 const QUICK: Thoroughness = Thoroughness { tours: 4_000 };
@@ -73,4 +75,55 @@ fn what_is_planned_is_what_comes_of_it_in_the_mean() {
     let mean = world.mean_snr(above, above).unwrap();
     let expected = channel.expected_data_per_slot(true, mean);
     assert!((planned.collected - expected).abs() < 0.01 * expected, "{} {expected}", planned.collected);
+}
+
+fn command(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gleaner-train")).arg("oracle").args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_file_of_plans_gets_its_bounds_later_and_keeps_its_plans() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("oracle.jsonl");
+    let file = path.to_str().unwrap();
+    let quick = ["--out", file, "--realizations", "2", "--tours", "50"];
+    let settings = || -> Vec<OracleSetting> {
+        let text = fs::read_to_string(&path).unwrap();
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    assert!(command(&quick).status.success());
+    let planned = settings();
+    assert_eq!(planned.len(), 10);
+    assert!(planned.iter().all(|setting| setting.upper_bound_percent.is_empty()));
+
+    let output = command(&[&quick[..], &["--bound", "3"]].concat());
+    assert!(output.status.success());
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(said.matches("can be had").count(), 10, "{said}");
+    let bounded = settings();
+    for (before, after) in planned.iter().zip(&bounded) {
+        assert_eq!(
+            (&before.missions, after.upper_bound_percent.len(), after.bound_parts),
+            (&after.missions, 2, 3)
+        );
+        for (mission, bound) in after.upper_bound_percent.iter().enumerate() {
+            let most = after.missions.0.iter().map(|missions| missions[mission][0]).fold(0.0, f32::max);
+            assert!((most - 1e-3..=100.0).contains(bound), "{bound} % is proven and {most} % planned");
+        }
+    }
+    // A smaller effort is no reason to do it again.
+    assert!(command(&[&quick[..], &["--bound", "2"]].concat()).status.success());
+    assert_eq!(settings(), bounded);
+}
+
+#[test]
+fn a_damaged_file_is_refused_and_left_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("oracle.jsonl");
+    fs::write(&path, "{\"scenario\":\"rd\"").unwrap();
+    let output = command(&["--out", path.to_str().unwrap(), "--realizations", "1", "--tours", "1"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("line 1 is not what") && said.trim_end().lines().count() == 1, "{said}");
+    assert_eq!(fs::read_to_string(&path).unwrap(), "{\"scenario\":\"rd\"");
 }

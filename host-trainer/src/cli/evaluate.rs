@@ -1,10 +1,11 @@
 //! `gleaner-train evaluate`.
 
+use super::oracle::{bar, plan, prove};
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{
     Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
 };
-use gleaner_host_trainer::oracle::{Thoroughness, consult};
+use gleaner_host_trainer::oracle::Thoroughness;
 use gleaner_host_trainer::planner::Rates;
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
@@ -39,6 +40,10 @@ pub struct Arguments {
     /// The oracle too, with so many tours for each search; 20,000 take less than a second per mission.
     #[arg(long, value_name = "TOURS")]
     oracle: Option<u32>,
+    /// Prove how much of the data can be had at most, looking at so many parts of each mission's possibilities; 2000 take
+    /// some seconds per mission.
+    #[arg(long, value_name = "PARTS", requires = "oracle")]
+    bound: Option<u32>,
     /// One JSON object instead of tables.
     #[arg(long)]
     json: bool,
@@ -54,10 +59,20 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let places = places(arguments)?;
     let mut systems =
         vec![("GREEDY".to_owned(), over(&places, |world, drawn| Ok(fly_greedy(world, drawn)))?)];
+    let mut bounds = Vec::new();
     if let Some(tours) = arguments.oracle {
-        systems
-            .push(("oracle".to_owned(), over(&places, |world, drawn| Ok(consult_all(world, drawn, tours)))?));
+        let table = over(&places, |world, drawn| {
+            let rates = Rates::new(Arc::clone(world));
+            let planned = plan(&rates, drawn, Thoroughness { tours }, &bar(drawn, "oracle".into()));
+            if let Some(parts) = arguments.bound {
+                let bar = bar(drawn, "proven bound".into());
+                bounds.extend(prove(&rates, drawn, &planned, parts, &bar));
+            }
+            Ok(planned)
+        })?;
+        systems.push(("oracle".to_owned(), table));
     }
+    let bound = (!bounds.is_empty()).then(|| bounds.iter().sum::<f32>() / bounds.len() as f32);
     if let Some(folder) = &arguments.run {
         let learned = learned(folder)?;
         let mut decider = learned.decider();
@@ -73,10 +88,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         systems.push((format!("{}", path.display()), table));
     }
     if arguments.json {
-        let object: serde_json::Map<_, _> = systems
+        let mut object: serde_json::Map<_, _> = systems
             .into_iter()
             .map(|(name, table)| Ok((name, serde_json::to_value(table)?)))
             .collect::<Result<_>>()?;
+        if let Some(percent) = bound {
+            object.insert("proven bound".to_owned(), serde_json::json!({ "data_percent": percent }));
+        }
         println!("{}", serde_json::Value::Object(object));
     } else {
         let cities =
@@ -87,6 +105,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         );
         for (name, table) in &systems {
             println!("\n{name}\n{}", render(table));
+        }
+        if let Some(percent) = bound {
+            println!("\nproven bound: nobody can have more than {percent:.1} % of the data in the mean");
         }
     }
     Ok(())
@@ -128,19 +149,6 @@ fn over(
         }
     }
     Ok(all.table())
-}
-
-/// The oracle's plans, by preference and mission.
-fn consult_all(world: &Arc<World>, drawn: &[(Seed, Realization)], tours: u32) -> Missions {
-    let rates = Rates::new(Arc::clone(world));
-    let mut missions = Missions(vec![Vec::new(); test_preferences().len()]);
-    for (_, realization) in drawn {
-        for (list, reward) in missions.0.iter_mut().zip(consult(&rates, realization, Thoroughness { tours }))
-        {
-            list.push(reward);
-        }
-    }
-    missions
 }
 
 /// The best parameters of the run in `folder`.

@@ -2,6 +2,7 @@
 
 use super::evaluate::render;
 use super::learned_of;
+use super::write_whole;
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
@@ -194,11 +195,4 @@ fn head_commit() -> Result<String> {
         bail!("git rev-parse HEAD failed");
     }
     Ok(String::from_utf8(output.stdout)?.trim().to_owned())
-}
-
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let temporary = path.with_extension("writing");
-    fs::write(&temporary, bytes)
-        .and_then(|()| fs::rename(&temporary, path))
-        .with_context(|| format!("{}", path.display()))
 }

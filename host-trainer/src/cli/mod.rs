@@ -11,6 +11,7 @@ use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
 use gleaner_host_trainer::learned::Learned;
 use gleaner_host_trainer::system::System;
+use gleaner_host_trainer::whole;
 use std::path::Path;
 
 /// Learns, evaluates and exports policies for Gleaner.
@@ -51,6 +52,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         Command::Export(arguments) => export::run(arguments),
         Command::Report(arguments) => report::run(arguments),
     }
+}
+
+/// So that a kill or a full disk leaves the old file or the new one.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    whole::write(path, bytes).with_context(|| path.display().to_string())
 }
 
 /// The best parameters of the run in `folder`, which must be of this system.

@@ -1,13 +1,14 @@
 //! `gleaner-train report`.
 
 use super::systems::System;
-use anyhow::{Context, Result, bail};
+use super::{oracle, write_whole};
+use anyhow::{Result, bail};
 use gleaner_host_trainer::curves;
 use gleaner_host_trainer::evaluation::{fly_all, fly_greedy, realizations, test_preferences};
 use gleaner_host_trainer::explanation::{track, watch};
 use gleaner_host_trainer::paper::Setting;
 use gleaner_host_trainer::parts::{Parts, Source};
-use gleaner_host_trainer::report::{self, Detail, OracleSetting, Report};
+use gleaner_host_trainer::report::{self, Detail, Report};
 use gleaner_host_trainer::robustness::{repeat_flights, world_with};
 use gleaner_host_trainer::system::System as Learner;
 use gleaner_policy::Preference;
@@ -16,7 +17,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs;
-use std::io::{BufRead, BufReader, IsTerminal};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -62,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let chosen = Chosen::by(arguments);
     let mut systems = chosen.systems()?;
-    let oracle = chosen.oracle.as_deref().map(read_oracle).transpose()?.unwrap_or_default();
+    let oracle = chosen.oracle.as_deref().map(oracle::read).transpose()?.unwrap_or_default();
     let curves = chosen.curves()?;
     let desk = Desk::open(arguments, systems.len())?;
     let mut shown = vec![desk.greedy()?];
@@ -325,20 +326,6 @@ fn named(argument: &str) -> Named {
     }
 }
 
-fn read_oracle(path: &Path) -> Result<Vec<OracleSetting>> {
-    let file = fs::File::open(path).with_context(|| format!("--oracle {}", path.display()))?;
-    let parse = |(index, line): (usize, std::io::Result<String>)| -> Result<OracleSetting> {
-        let place =
-            || format!("{}: line {} is not what `gleaner-train oracle` writes", path.display(), index + 1);
-        let setting: OracleSetting = serde_json::from_str(&line?).with_context(place)?;
-        if setting.missions.0.len() != test_preferences().len() {
-            bail!("{}: line {}: not eleven preferences", path.display(), index + 1);
-        }
-        Ok(setting)
-    };
-    BufReader::new(file).lines().enumerate().map(parse).collect()
-}
-
 /// As it was typed.
 fn command_line() -> String {
     let words =
@@ -352,11 +339,4 @@ fn machine() -> String {
     let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     model
         .map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| format!("{}, one thread", name.trim()))
-}
-
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let temporary = path.with_extension("writing");
-    fs::write(&temporary, bytes)
-        .and_then(|()| fs::rename(&temporary, path))
-        .with_context(|| path.display().to_string())
 }

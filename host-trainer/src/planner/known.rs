@@ -42,6 +42,16 @@ impl Rates {
         (snr_db, if index < 0.0 { 0.0 } else { table[(index as usize).min(TABLE_LEN - 1)] })
     }
 
+    /// Expected data units per slot.
+    pub(super) fn units_per_slot(&self, device: Cell, uav: Cell) -> f32 {
+        self.link(device, uav).1
+    }
+
+    /// The grid of the city.
+    pub(super) fn grid(&self) -> Grid {
+        self.world.city().grid()
+    }
+
     /// Everything about one mission, without fence and reserve.
     #[must_use]
     pub fn study(&self, realization: &Realization) -> Known {

@@ -4,10 +4,12 @@
 //! the mean: each slot brings what the channel's expected rate says, from whichever device is heard best in the mean.
 //! The best tour is searched by simulated annealing.
 
+mod bound;
 mod known;
 mod search;
 mod tour;
 
+pub use bound::upper_bound_percent;
 pub use known::{Audible, Known, Rates};
 pub use search::{Effort, Problem};
 pub use tour::{DEVICES_MAX, State, Stop, Tour};
