@@ -124,6 +124,7 @@ fn payload(path: &Path) -> Result<Vec<u8>, CheckpointError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn a_checkpoint_comes_back_and_damage_is_noticed() {

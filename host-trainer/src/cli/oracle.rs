@@ -14,6 +14,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// The file that is shipped.
+const SHIPPED: &str = "models/oracle.jsonl";
+
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// The file of the results, one JSON object a line. What it has already is not done again.
@@ -25,8 +28,8 @@ pub struct Arguments {
     /// Tours that are tried per mission and preference, twice.
     #[arg(long, default_value_t = 100_000)]
     tours: u32,
-    /// Prove how much of the data can be had at most, too, looking at so many parts of each mission's possibilities: 2000
-    /// take seconds per mission, twenty with ten devices. 0 proves nothing.
+    /// Prove how much of the data can be had at most, too, looking at so many parts of each mission's possibilities; 2000
+    /// take seconds per mission. 0 proves nothing.
     #[arg(long, value_name = "PARTS", default_value_t = 0)]
     bound: u32,
 }
@@ -121,8 +124,14 @@ pub(super) fn prove(
     bounds
 }
 
+/// The settings in the named file, or in the shipped one if it is there.
+pub(super) fn read_or_shipped(named: Option<&Path>) -> Result<Vec<OracleSetting>> {
+    let shipped = Path::new(SHIPPED);
+    named.or_else(|| shipped.exists().then_some(shipped)).map_or_else(|| Ok(Vec::new()), read)
+}
+
 /// The settings in a file that this command wrote.
-pub(super) fn read(path: &Path) -> Result<Vec<OracleSetting>> {
+fn read(path: &Path) -> Result<Vec<OracleSetting>> {
     let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
     let parse = |(index, line): (usize, &str)| -> Result<OracleSetting> {
         let place =

@@ -21,10 +21,9 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// What is reported on when nothing is named: the model, a folder for each of the paper's systems, and the oracle.
+/// What is reported on when nothing is named: the model, and a folder for each of the paper's systems.
 const SHIPPED: &str = "models/gleaner.onnx";
 const SHIPPED_RUNS: &str = "models/paper";
-const SHIPPED_ORACLE: &str = "models/oracle.jsonl";
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -63,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     let chosen = Chosen::by(arguments);
     let mut systems = chosen.systems()?;
-    let oracle = chosen.oracle.as_deref().map(oracle::read).transpose()?.unwrap_or_default();
+    let oracle = oracle::read_or_shipped(arguments.oracle.as_deref())?;
     let curves = chosen.curves()?;
     let desk = Desk::open(arguments, systems.len())?;
     let mut shown = vec![desk.greedy()?];
@@ -257,7 +256,6 @@ struct Chosen {
     models: Vec<Named>,
     runs: Vec<Named>,
     curves: Vec<Named>,
-    oracle: Option<PathBuf>,
 }
 
 impl Chosen {
@@ -267,7 +265,6 @@ impl Chosen {
             models: named(&arguments.model),
             runs: named(&arguments.run),
             curves: named(&arguments.curve),
-            oracle: arguments.oracle.clone(),
         };
         if chosen.models.is_empty() && chosen.runs.is_empty() {
             let runs = Learner::ALL
@@ -275,8 +272,6 @@ impl Chosen {
             chosen.models.push((None, SHIPPED.into()));
             chosen.runs.extend(runs.into_iter().filter(|(_, folder)| folder.is_dir()));
         }
-        let shipped = Path::new(SHIPPED_ORACLE);
-        chosen.oracle = chosen.oracle.or_else(|| shipped.exists().then(|| shipped.into()));
         chosen
     }
 

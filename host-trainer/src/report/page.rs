@@ -125,8 +125,8 @@ fn main_section(report: &Report) -> Markup {
                 "numbers are what the best tour that it found brings in the mean of the channel. It is a strong search, "
                 "not a proof."
                 @if report.is_bounded() {
-                    " No system can pass the proven bound: it is computed for the data, it is the shortest mission for "
-                    "the energy, and the bounds of utility and hypervolume follow from those two, loosely."
+                    " Nobody can pass the proven bound, counted in the mean of the channel like the oracle: branch and bound "
+                    "gives that of the data, the shortest mission that of the energy, and the bounds of utility and hypervolume follow from those two, loosely."
                 }
             }
         },
