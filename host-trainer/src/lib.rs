@@ -19,7 +19,7 @@
 //! The policies that fly come another way: [`distil`] copies the [`teacher`], who knows what the aircraft cannot see,
 //! and [`refine`] lets the pupil learn from its own flights. What one loop asks of all three ways is [`learning`]. What
 //! they are measured against is the [`oracle`]: the best tour that the [`planner`] finds for someone who knows
-//! everything.
+//! everything, and a proven bound on what anyone can have.
 
 pub mod checkpoint;
 pub mod curves;

@@ -2,7 +2,7 @@
 //!
 //! A plan is a [`Tour`]: places to hover, for how long, and the way between them. Tours are judged by flying them in
 //! the mean: each slot brings what the channel's expected rate says, from whichever device is heard best in the mean.
-//! The best tour is searched by simulated annealing.
+//! The best tour is searched by simulated annealing. How much better the best of all can be, [`upper_bound_percent`] says.
 
 mod bound;
 mod known;
