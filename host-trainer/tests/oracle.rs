@@ -81,6 +81,14 @@ fn command(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_gleaner-train")).arg("oracle").args(arguments).output().unwrap()
 }
 
+/// The one line that a command says that was refused.
+fn refused(output: Output) -> String {
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    said
+}
+
 #[test]
 fn a_file_of_plans_gets_its_bounds_later_and_keeps_its_plans() {
     let folder = tempfile::tempdir().unwrap();
@@ -121,9 +129,14 @@ fn a_damaged_file_is_refused_and_left_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("oracle.jsonl");
     fs::write(&path, "{\"scenario\":\"rd\"").unwrap();
-    let output = command(&["--out", path.to_str().unwrap(), "--realizations", "1", "--tours", "1"]);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("line 1 is not what") && said.trim_end().lines().count() == 1, "{said}");
+    let said = refused(command(&["--out", path.to_str().unwrap(), "--realizations", "1", "--tours", "1"]));
+    assert!(said.contains("line 1 is not what"), "{said}");
     assert_eq!(fs::read_to_string(&path).unwrap(), "{\"scenario\":\"rd\"");
+}
+
+#[test]
+fn more_devices_than_the_planner_takes_are_refused() {
+    let asked = ["evaluate", "--devices", "13", "--realizations", "1", "--oracle", "1"];
+    let said = refused(Command::new(env!("CARGO_BIN_EXE_gleaner-train")).args(asked).output().unwrap());
+    assert!(said.contains("at most 12"), "{said}");
 }

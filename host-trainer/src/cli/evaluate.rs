@@ -6,7 +6,7 @@ use gleaner_host_trainer::evaluation::{
     Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
 };
 use gleaner_host_trainer::oracle::Thoroughness;
-use gleaner_host_trainer::planner::Rates;
+use gleaner_host_trainer::planner::{DEVICES_MAX, Rates};
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{Channel, City, Realization, ScenarioKind, Seed, World};
@@ -55,6 +55,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
     if arguments.cities == Some(0) {
         bail!("--cities 0: nowhere to fly; give at least 1, or leave it out for the default city");
+    }
+    if arguments.oracle.is_some() && arguments.devices > DEVICES_MAX {
+        bail!(
+            "--devices {}: the oracle plans for at most {DEVICES_MAX}; leave out --oracle",
+            arguments.devices
+        );
     }
     let places = places(arguments)?;
     let mut systems =

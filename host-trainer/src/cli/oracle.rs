@@ -47,34 +47,31 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let drawn = realizations(&world, &asked.scenario(), arguments.realizations)?;
         let is_asked =
             |line: &OracleSetting| line.is_of(asked) && line.realizations == arguments.realizations;
-        let mut index = lines.iter().rposition(is_asked);
-        if index.is_none() {
-            let bar = bar(&drawn, format!("{name}, tours"));
-            let missions = plan(&rates, &drawn, Thoroughness { tours: arguments.tours }, &bar);
-            index = Some(lines.len());
-            lines.push(OracleSetting {
-                scenario: kind.name().to_owned(),
-                devices,
-                battery,
-                realizations: arguments.realizations,
-                missions,
-                upper_bound_percent: Vec::new(),
-                bound_parts: 0,
-            });
+        let index = match lines.iter().rposition(is_asked) {
+            Some(index) => index,
+            None => {
+                let bar = bar(&drawn, format!("{name}, tours"));
+                lines.push(OracleSetting {
+                    scenario: kind.name().to_owned(),
+                    devices,
+                    battery,
+                    realizations: arguments.realizations,
+                    missions: plan(&rates, &drawn, Thoroughness { tours: arguments.tours }, &bar),
+                    upper_bound_percent: Vec::new(),
+                    bound_parts: 0,
+                });
+                write(&arguments.out, &lines)?;
+                lines.len() - 1
+            }
+        };
+        if lines[index].bound_parts < arguments.bound {
+            let bar = bar(&drawn, format!("{name}, bound"));
+            let bounds = prove(&rates, &drawn, &lines[index].missions, arguments.bound, &bar);
+            lines[index].upper_bound_percent = bounds;
+            lines[index].bound_parts = arguments.bound;
             write(&arguments.out, &lines)?;
         }
-        if let Some(line) = index.and_then(|index| lines.get_mut(index)) {
-            let is_new = line.bound_parts < arguments.bound;
-            if is_new {
-                let bar = bar(&drawn, format!("{name}, bound"));
-                line.upper_bound_percent = prove(&rates, &drawn, &line.missions, arguments.bound, &bar);
-                line.bound_parts = arguments.bound;
-            }
-            println!("{}", summary(line));
-            if is_new {
-                write(&arguments.out, &lines)?;
-            }
-        }
+        println!("{}", summary(&lines[index]));
     }
     Ok(())
 }
