@@ -39,6 +39,23 @@ const fn is_none(count: &u32) -> bool {
     *count == 0
 }
 
+impl OracleSetting {
+    /// The same of the first `count` realizations; `None` if there are not so many.
+    #[must_use]
+    pub fn first(mut self, count: u64) -> Option<OracleSetting> {
+        let len = usize::try_from(count).ok()?;
+        let is_enough = self.missions.0.iter().all(|missions| missions.len() >= len);
+        self.missions.0.iter_mut().for_each(|missions| missions.truncate(len));
+        // The mean over fewer missions is another one.
+        if self.upper_bound_percent.len() < len {
+            self.upper_bound_percent.clear();
+        }
+        self.upper_bound_percent.truncate(len);
+        self.realizations = count;
+        is_enough.then_some(self)
+    }
+}
+
 /// How hard to look for the best tour of a mission under one preference: two searches, one of them from the best
 /// tour of the preference before.
 #[derive(Clone, Copy, Debug)]

@@ -6,6 +6,7 @@ use gleaner_host_trainer::evaluation::{
     Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
 };
 use gleaner_host_trainer::oracle::Thoroughness;
+use gleaner_host_trainer::paper::Setting;
 use gleaner_host_trainer::planner::{DEVICES_MAX, Rates};
 use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
@@ -37,7 +38,8 @@ pub struct Arguments {
     /// one.
     #[arg(long)]
     cities: Option<u64>,
-    /// The oracle too, with so many tours for each search; 20,000 take less than a second per mission.
+    /// Ask the oracle, with so many tours for each search; 20,000 take less than a second per mission. Left out, it and
+    /// the proven bound are those of `models/oracle.jsonl` where that has these missions.
     #[arg(long, value_name = "TOURS")]
     oracle: Option<u32>,
     /// Prove how much of the data can be had at most, looking at so many parts of each mission's possibilities; 2000 take
@@ -65,20 +67,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let places = places(arguments)?;
     let mut systems =
         vec![("GREEDY".to_owned(), over(&places, |world, drawn| Ok(fly_greedy(world, drawn)))?)];
-    let mut bounds = Vec::new();
-    if let Some(tours) = arguments.oracle {
-        let table = over(&places, |world, drawn| {
-            let rates = Rates::new(Arc::clone(world));
-            let planned = plan(&rates, drawn, Thoroughness { tours }, &bar(drawn, "oracle".into()));
-            if let Some(parts) = arguments.bound {
-                let bar = bar(drawn, "proven bound".into());
-                bounds.extend(prove(&rates, drawn, &planned, parts, &bar));
-            }
-            Ok(planned)
-        })?;
-        systems.push(("oracle".to_owned(), table));
-    }
-    let bound = (!bounds.is_empty()).then(|| bounds.iter().sum::<f32>() / bounds.len() as f32);
     if let Some(folder) = &arguments.run {
         let learned = learned(folder)?;
         let mut decider = learned.decider();
@@ -93,30 +81,99 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         })?;
         systems.push((format!("{}", path.display()), table));
     }
+    let Limits { oracle, data_percent } = limits(arguments, &places)?;
+    let summary = summary(&systems, oracle.as_ref(), data_percent);
+    systems.extend(oracle.map(|oracle| (ORACLE.to_owned(), oracle)));
     if arguments.json {
         let mut object: serde_json::Map<_, _> = systems
             .into_iter()
             .map(|(name, table)| Ok((name, serde_json::to_value(table)?)))
             .collect::<Result<_>>()?;
-        if let Some(percent) = bound {
-            object.insert("proven bound".to_owned(), serde_json::json!({ "data_percent": percent }));
+        if let Some(percent) = data_percent {
+            object.insert(BOUND.to_owned(), serde_json::json!({ "data_percent": percent }));
         }
         println!("{}", serde_json::Value::Object(object));
     } else {
         let cities =
             arguments.cities.map_or(String::new(), |count| format!(" in each of {count} generated cities"));
         println!(
-            "{}, K = {}, B = {}, {} realizations{cities}",
+            "{}, K = {}, B = {}, {} realizations{cities}\n\n{summary}",
             arguments.scenario, arguments.devices, arguments.battery, arguments.realizations
         );
         for (name, table) in &systems {
-            println!("\n{name}\n{}", render(table));
-        }
-        if let Some(percent) = bound {
-            println!("\nproven bound: nobody can have more than {percent:.1} % of the data in the mean");
+            println!("\n## {name}\n\n{}", render(table));
         }
     }
     Ok(())
+}
+
+const ORACLE: &str = "oracle";
+const BOUND: &str = "proven bound";
+
+/// What systems are measured against, as far as it is known.
+#[derive(Default)]
+struct Limits {
+    oracle: Option<Table>,
+    /// Percent of the data at w = (1, 0) that nobody can exceed in the mean.
+    data_percent: Option<f32>,
+}
+
+/// Plans and proves what is asked for; else what is shipped has it, if it has these missions.
+fn limits(arguments: &Arguments, places: &[Place]) -> Result<Limits> {
+    let Some(tours) = arguments.oracle else {
+        if arguments.cities.is_some() {
+            return Ok(Limits::default());
+        }
+        let setting =
+            Setting { kind: arguments.scenario, devices: arguments.devices, battery: arguments.battery };
+        let known = super::oracle::known(None, setting, arguments.realizations)?;
+        return Ok(known.map_or_else(Limits::default, |known| Limits {
+            data_percent: known.limits(setting).map(|limits| limits.data_percent),
+            oracle: Some(known.missions.table()),
+        }));
+    };
+    let mut bounds = Vec::new();
+    let oracle = over(places, |world, drawn| {
+        let rates = Rates::new(Arc::clone(world));
+        let planned = plan(&rates, drawn, Thoroughness { tours }, &bar(drawn, ORACLE.into()));
+        if let Some(parts) = arguments.bound {
+            bounds.extend(prove(&rates, drawn, &planned, parts, &bar(drawn, BOUND.into())));
+        }
+        Ok(planned)
+    })?;
+    let data_percent = (!bounds.is_empty()).then(|| bounds.iter().sum::<f32>() / bounds.len() as f32);
+    Ok(Limits { oracle: Some(oracle), data_percent })
+}
+
+/// All systems in one Markdown table, with their share of what the oracle reaches.
+fn summary(systems: &[(String, Table)], oracle: Option<&Table>, bound: Option<f32>) -> String {
+    let mut text = String::from(
+        "| | data % at w = (1, 0) | of the oracle's | battery at w = (0, 1) | hypervolume | of the oracle's \
+         | average utility |\n|---|---|---|---|---|---|---|\n",
+    );
+    let share = |own: f64, oracle: Option<f64>| {
+        oracle.map_or_else(|| "-".to_owned(), |oracle| format!("{:.1} %", 100.0 * own / oracle))
+    };
+    for (name, table) in
+        systems.iter().map(|(name, table)| (name.as_str(), table)).chain(oracle.map(|o| (ORACLE, o)))
+    {
+        let energy = table.rows.first().map_or((0.0, 0.0), |row| (row.energy, row.energy_std));
+        text += &format!(
+            "| {name} | {:.1} | {} | {:.2} ± {:.2} | {:.0} | {} | {:.2} |\n",
+            table.coverage(),
+            share(table.coverage().into(), oracle.map(|oracle| oracle.coverage().into())),
+            energy.0,
+            energy.1,
+            table.hypervolume,
+            share(table.hypervolume, oracle.map(|oracle| oracle.hypervolume)),
+            table.utility,
+        );
+    }
+    if let Some(percent) = bound {
+        let share = share(percent.into(), oracle.map(|oracle| oracle.coverage().into()));
+        text += &format!("| {BOUND} | {percent:.1} | {share} | - | - | - | - |\n");
+    }
+    text
 }
 
 /// A city, and the missions to fly over it.
