@@ -82,5 +82,5 @@ pub enum StartError {
     },
     /// Interrupts cannot be caught.
     #[error("cannot catch interrupts: {0}: start the program outside of what blocks its signals")]
-    Signals(ctrlc::Error),
+    Signals(io::Error),
 }

@@ -21,7 +21,12 @@ mod timed;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let outcome = match args::parse() {
+    let command = args::parse();
+    if !matches!(command, Ok(args::Command::Run(_))) {
+        // `check | head` ends quietly. What flies must outlive whoever reads its messages.
+        sigpipe::reset();
+    }
+    let outcome = match command {
         Ok(args::Command::Run(setup)) => run::run(&setup),
         Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
         Ok(args::Command::Bench(order)) => bench::bench(&order),

@@ -17,9 +17,9 @@ use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use gleaner_units::Duration as PilotDuration;
 use std::io::IsTerminal;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
+use tracing_appender::non_blocking::WorkerGuard;
 
 /// Time between polls of the pilot, which wants 20 Hz or more.
 const TICK: Duration = Duration::from_millis(20);
@@ -46,8 +46,8 @@ pub fn run(setup: &Setup) -> Result<ExitCode, StartError> {
     let log = config.log_dir.as_deref().map(DecisionLog::open).transpose()?;
     let link = open("autopilot", &config.autopilot)?;
     let radio = config.radio.as_ref().map(|endpoint| open("radio", endpoint)).transpose()?;
-    let stop = stop_on_interrupt()?;
-    start_messages();
+    let stop = gleaner_ports::asked_to_end().map_err(StartError::Signals)?;
+    let _messages = start_messages();
     introduce(&config, &model, &link, radio.as_ref());
     let mut flight = Flight { onboard, link, radio, log, clock: Clock::start(), said: State::Boot };
     flight.fly(|| stop.load(Ordering::Relaxed));
@@ -60,23 +60,22 @@ pub fn open(role: &'static str, endpoint: &gleaner_ports::Endpoint) -> Result<Po
     Port::open(endpoint).map_err(|source| StartError::Port { role, source })
 }
 
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>, StartError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).map_err(StartError::Signals)?;
-    Ok(stop)
-}
-
-/// Messages go to stderr from here on; before, stderr holds at most the one line of an error.
-fn start_messages() {
+/// Messages go to stderr from here on, until what it gives is dropped; before, stderr holds at most the one line of an
+/// error. They leave on a thread of their own: a terminal that is held, a log that nobody takes or a full disk must not
+/// hold the flight.
+fn start_messages() -> WorkerGuard {
+    let (writer, guard) = tracing_appender::non_blocking(std::io::stderr());
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr)
+        .with_writer(writer)
+        // There is no other place to say that it cannot be said.
+        .log_internal_errors(false)
         .with_target(false)
         .init();
+    guard
 }
 
 fn introduce(config: &Config, model: &str, link: &Port, radio: Option<&Port>) {

@@ -8,7 +8,7 @@ use gleaner_link::{Address, FrameDecoder, Message, Packet, TUNNEL_DECISION};
 use gleaner_policy::LOCAL_MAP_CELLS;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, UdpSocket};
 use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::Duration;
@@ -42,14 +42,22 @@ impl Running {
         }
     }
 
-    /// Interrupts it; its exit code and what it said until then.
-    fn stop(mut self) -> (Option<i32>, String) {
-        let interrupt = format!("kill -TERM {}", self.child.id());
-        assert!(Command::new("sh").args(["-c", &interrupt]).status().unwrap().success());
+    /// Asks it to end; its exit code and what it said until then.
+    fn stop(self) -> (Option<i32>, String) {
+        self.stop_by("TERM")
+    }
+
+    fn stop_by(mut self, name: &str) -> (Option<i32>, String) {
+        signal(&self.child, name);
         let mut rest = String::new();
         while self.stderr.read_line(&mut rest).unwrap() > 0 {}
         (self.child.wait().unwrap().code(), rest)
     }
+}
+
+fn signal(process: &Child, name: &str) {
+    let kill = format!("kill -{name} {}", process.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
 }
 
 impl Drop for Running {
@@ -69,7 +77,11 @@ struct FakeAutopilot {
 impl FakeAutopilot {
     /// Connects to where the process says that it listens.
     fn find(running: &mut Running) -> FakeAutopilot {
-        let line = running.says("local address ");
+        FakeAutopilot::at(&running.says("local address "))
+    }
+
+    /// Connects to the address at the end of the line.
+    fn at(line: &str) -> FakeAutopilot {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(line.split("local address ").last().unwrap()).unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
@@ -234,6 +246,68 @@ fn a_full_disk_is_said_once_and_the_flight_goes_on() {
     assert_eq!(code, Some(0), "{rest}");
     assert_eq!(rest.matches("make room on the disk; flying on without the log").count(), 1, "{rest}");
     assert!(rest.contains("decisions were not written"), "{rest}");
+}
+
+/// Who reads the messages must not decide over the flight: a log nobody takes any more, and a terminal that is held.
+#[test]
+fn messages_that_nobody_takes_do_not_end_the_flight_nor_hold_it() {
+    for is_held in [false, true] {
+        let fixture = Fixture::new();
+        let (messages, stderr) = std::io::pipe().unwrap();
+        let mut child = fixture.gleaner("run").env("RUST_LOG", "trace").stderr(stderr).spawn().unwrap();
+        let mut messages = BufReader::new(messages);
+        let mut line = String::new();
+        while !line.contains("local address ") {
+            line.clear();
+            assert_ne!(messages.read_line(&mut line).unwrap(), 0, "it ended");
+        }
+        let mut autopilot = FakeAutopilot::at(line.trim_end());
+        let _held = if is_held {
+            fill(messages.get_ref());
+            Some(messages)
+        } else {
+            drop(messages);
+            None
+        };
+        autopilot.await_decision();
+        signal(&child, "TERM");
+        assert_eq!(child.wait().unwrap().code(), Some(0), "held: {is_held}");
+    }
+}
+
+/// Fills the pipe that ends here, so that one more byte would wait.
+fn fill(pipe: &std::io::PipeReader) {
+    use std::os::fd::AsRawFd;
+    use std::os::unix::fs::OpenOptionsExt;
+    let nonblocking = rustix::fs::OFlags::NONBLOCK.bits() as i32;
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).custom_flags(nonblocking);
+    let mut pipe = options.open(format!("/proc/self/fd/{}", pipe.as_raw_fd())).unwrap();
+    while pipe.write(&[b'.']).is_ok() {}
+}
+
+#[test]
+fn a_closed_terminal_ends_the_run_unless_hangups_are_ignored() {
+    let fixture = Fixture::new();
+    let mut running = Running::start(&mut fixture.gleaner("run"));
+    FakeAutopilot::find(&mut running)
+        .until(|_, message| matches!(message, Message::Heartbeat(_)).then_some(()));
+    let (code, rest) = running.stop_by("HUP");
+    assert_eq!(code, Some(0), "{rest}");
+
+    let gleaner = fixture.gleaner("run");
+    let mut ignoring = Command::new("sh");
+    ignoring
+        .args(["-c", "trap '' HUP; exec \"$@\"", "sh"])
+        .arg(gleaner.get_program())
+        .args(gleaner.get_args());
+    let mut running = Running::start(&mut ignoring);
+    let mut autopilot = FakeAutopilot::find(&mut running);
+    signal(&running.child, "HUP");
+    autopilot.await_decision();
+    let (code, rest) = running.stop();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(!rest.contains("stopped after 0 decisions"), "{rest}");
 }
 
 #[test]

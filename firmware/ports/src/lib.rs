@@ -1,4 +1,5 @@
-//! Byte streams to autopilots, radios and ground stations that never block: UDP, TCP and serial ports.
+//! Byte streams to autopilots, radios and ground stations that never block: UDP, TCP and serial ports. And
+//! [`asked_to_end`], for the loops around them.
 //!
 //! Host only: this crate opens sockets and devices for the programs. Nothing that flies decides here.
 //!
@@ -29,6 +30,7 @@ mod outbox;
 mod port;
 mod retry;
 mod serial;
+mod signals;
 mod tcp;
 mod transport;
 mod udp;
@@ -37,6 +39,7 @@ pub use endpoint::{DEFAULT_BAUD, Endpoint, EndpointError, EndpointFault, SocketN
 pub use outbox::OUTBOX_BYTES;
 pub use port::{Port, PortError, State, wait};
 pub use retry::{RETRY_FIRST, RETRY_LONGEST};
+pub use signals::asked_to_end;
 pub use tcp::CONNECT_TIMEOUT;
 pub use transport::Down;
 pub use udp::MAX_PEERS;

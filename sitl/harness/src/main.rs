@@ -4,6 +4,8 @@ use gleaner_harness::program::{Arguments, run};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    // `fly | head` ends quietly.
+    sigpipe::reset();
     let arguments = match Arguments::read() {
         Ok(arguments) => arguments,
         Err(code) => return ExitCode::from(code),

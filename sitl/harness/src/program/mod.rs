@@ -44,7 +44,7 @@ pub enum ProgramError {
     Port(gleaner_ports::PortError),
     /// The system does not let us hear an interrupt.
     #[error("cannot listen for an interrupt: {0}: run it in the foreground of a terminal")]
-    Signals(ctrlc::Error),
+    Signals(io::Error),
     /// Nobody reads what we print.
     #[error("cannot print: {0}: give it a standard output")]
     Stdout(io::Error),

@@ -26,9 +26,7 @@ pub(super) fn serve(order: &ServeOrder) -> Result<bool, ProgramError> {
         write_mission(&staged, path)?;
     }
     let mut server = Server::open(order, staged)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).map_err(ProgramError::Signals)?;
+    let stop = gleaner_ports::asked_to_end().map_err(ProgramError::Signals)?;
     server.introduce(order)?;
     let finished = server.run(order, &stop)?;
     server.report(order, finished, begun)
