@@ -3,10 +3,11 @@
 //! The pilot is the Linux program `gleaner` on two sockets. A board behind an emulator stands in the same place, see
 //! `board.rs`; what fails here is not the board's fault.
 
-use gleaner_tests::programs::{Running, repository};
+use gleaner_tests::programs::{self, Running, repository};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 /// A mission of RB for energy alone is two decisions; ten times as fast it takes a quarter of a minute.
 const QUICK: [&str; 8] = ["--scenario", "rb", "--seed", "5", "--preference", "0", "--haste", "8"];
@@ -38,8 +39,23 @@ fn fly(arguments: &[&str], has_radio: bool) -> Flight {
     words.extend(radio.iter().flat_map(|radio| ["--radio", radio]));
     let _pilot = Running::start("gleaner", &words);
     let report = city.line("{");
+    assert_eq!(replayed(&log, "tract"), "0.0e0", "the same engine, the same bits");
+    let apart: f32 = replayed(&log, "native").parse().unwrap();
+    assert!(apart <= gleaner_policy::GOLDEN_TOLERANCE, "{apart}");
     let decisions = [&out, &log].map(|folder| lines(&Path::new(folder).join("decisions.jsonl")));
     Flight { report: serde_json::from_str(&format!("{{{report}")).unwrap(), decisions }
+}
+
+/// Decides what flew again, all of it alike; how far a logit is from what it was.
+fn replayed(log: &str, engine: &str) -> String {
+    let model = repository().join("models/gleaner.onnx");
+    let mut replay = Command::new(programs::path("gleaner"));
+    replay.arg("replay").arg(Path::new(log).join("decisions.jsonl")).arg("--model").arg(model);
+    let output = replay.args(["--engine", engine]).output().unwrap();
+    let stdout = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{stdout}");
+    let furthest = stdout.lines().find_map(|line| line.strip_prefix("logits apart by at most  "));
+    furthest.unwrap().to_owned()
 }
 
 fn lines(path: &Path) -> Vec<Value> {

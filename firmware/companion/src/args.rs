@@ -33,6 +33,21 @@ pub enum Command {
     Bench(Bench),
     /// Convert a model for the native engine, and let it prove itself there.
     Convert(Conversion),
+    /// Decide a decision log again, with the model that flew or with another one, and say what is decided otherwise.
+    Replay(Replay),
+}
+
+/// A flight to decide again.
+#[derive(Args)]
+pub struct Replay {
+    /// The decision log (decisions.jsonl).
+    pub log: PathBuf,
+    /// The trained policy.
+    #[arg(long, value_name = "FILE")]
+    pub model: PathBuf,
+    /// What runs it: tract or native.
+    #[arg(long, value_name = "ENGINE", default_value = "tract")]
+    pub engine: EngineKind,
 }
 
 /// A model to time.

@@ -72,6 +72,12 @@ pub enum StartError {
         /// Why.
         source: io::Error,
     },
+    /// There is nothing to decide again.
+    #[error("decision log {}: holds no decision: give the decisions.jsonl that `gleaner run --log` wrote", .path.display())]
+    NoDecisions {
+        /// Where.
+        path: PathBuf,
+    },
     /// A port cannot be opened.
     #[error("{role} port {source}")]
     Port {

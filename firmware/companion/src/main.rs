@@ -3,7 +3,7 @@
 //! This program wires and reports: it opens ports and files, feeds bytes and the time to
 //! [`gleaner_pilot::Onboard`], and carries its bytes away. Nothing is decided here.
 //!
-//! Exit codes: 0 done, 1 ran but the verdict is negative (`check`), 2 could not run. An error is one line on
+//! Exit codes: 0 done, 1 ran but the verdict is negative (`check`, `replay`), 2 could not run. An error is one line on
 //! stderr: what, where, what to do.
 
 mod args;
@@ -15,6 +15,7 @@ mod convert;
 mod error;
 mod load;
 mod log;
+mod replay;
 mod run;
 mod timed;
 
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
         Ok(args::Command::Bench(order)) => bench::bench(&order),
         Ok(args::Command::Convert(conversion)) => convert::convert(&conversion),
+        Ok(args::Command::Replay(order)) => replay::replay(&order),
         Err(answered) => return answered,
     };
     outcome.unwrap_or_else(|error| {
