@@ -16,9 +16,12 @@ use std::time::Duration;
 const AUTOPILOT: Address = Address::new(7, 1);
 const GLEANER: Address = Address::new(7, 191);
 
-/// The process, killed when a test fails.
+/// Killed when a test fails.
+struct Process(Child);
+
+/// The process, and what it says.
 struct Running {
-    child: Child,
+    process: Process,
     stderr: BufReader<ChildStderr>,
 }
 
@@ -26,7 +29,7 @@ impl Running {
     fn start(gleaner: &mut Command) -> Running {
         let mut child = gleaner.stderr(Stdio::piped()).spawn().unwrap();
         let stderr = BufReader::new(child.stderr.take().unwrap());
-        Running { child, stderr }
+        Running { process: Process(child), stderr }
     }
 
     /// Reads stderr up to a line that contains `part`.
@@ -48,22 +51,24 @@ impl Running {
     }
 
     fn stop_by(mut self, name: &str) -> (Option<i32>, String) {
-        signal(&self.child, name);
+        self.process.signal(name);
         let mut rest = String::new();
         while self.stderr.read_line(&mut rest).unwrap() > 0 {}
-        (self.child.wait().unwrap().code(), rest)
+        (self.process.0.wait().unwrap().code(), rest)
     }
 }
 
-fn signal(process: &Child, name: &str) {
-    let kill = format!("kill -{name} {}", process.id());
-    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+impl Process {
+    fn signal(&self, name: &str) {
+        let kill = format!("kill -{name} {}", self.0.id());
+        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+    }
 }
 
-impl Drop for Running {
+impl Drop for Process {
     fn drop(&mut self) {
         // Fails when it has ended already, as it should.
-        let _ = self.child.kill();
+        let _ = self.0.kill();
     }
 }
 
@@ -254,7 +259,8 @@ fn messages_that_nobody_takes_do_not_end_the_flight_nor_hold_it() {
     for is_held in [false, true] {
         let fixture = Fixture::new();
         let (messages, stderr) = std::io::pipe().unwrap();
-        let mut child = fixture.gleaner("run").env("RUST_LOG", "trace").stderr(stderr).spawn().unwrap();
+        let child = fixture.gleaner("run").env("RUST_LOG", "trace").stderr(stderr).spawn().unwrap();
+        let mut process = Process(child);
         let mut messages = BufReader::new(messages);
         let mut line = String::new();
         while !line.contains("local address ") {
@@ -270,8 +276,8 @@ fn messages_that_nobody_takes_do_not_end_the_flight_nor_hold_it() {
             None
         };
         autopilot.await_decision();
-        signal(&child, "TERM");
-        assert_eq!(child.wait().unwrap().code(), Some(0), "held: {is_held}");
+        process.signal("TERM");
+        assert_eq!(process.0.wait().unwrap().code(), Some(0), "held: {is_held}");
     }
 }
 
@@ -303,7 +309,7 @@ fn a_closed_terminal_ends_the_run_unless_hangups_are_ignored() {
         .args(gleaner.get_args());
     let mut running = Running::start(&mut ignoring);
     let mut autopilot = FakeAutopilot::find(&mut running);
-    signal(&running.child, "HUP");
+    running.process.signal("HUP");
     autopilot.await_decision();
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");
