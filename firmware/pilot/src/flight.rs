@@ -14,6 +14,8 @@ use gleaner_units::{Action, BatteryUnits, Cell, Duration, Instant, Metres, Metre
 const UNREADY: Duration = Duration::from_secs(2);
 /// How often a command is begun that the link has already repeated three times.
 const ATTEMPTS: u8 = 3;
+/// Pause before the autopilot is asked again to take the aircraft back.
+const ASK_AGAIN: Duration = Duration::from_secs(2);
 /// Legs in a row without progress after which there is nothing left to try.
 const STALLS: u8 = 2;
 
@@ -158,7 +160,7 @@ impl Machine {
     ) -> Phase {
         let position = match flight.judge(now, late, inputs) {
             Ok(position) => position,
-            Err(upset) => return give_up(upset, inputs, out),
+            Err(upset) => return give_up(now, upset, inputs, out),
         };
         flight.keep_speed(inputs, out);
         if inputs.vehicle.failsafe {
@@ -190,10 +192,10 @@ impl Machine {
     ) -> Phase {
         let position = match flight.judge(now, late, inputs) {
             Ok(position) => position,
-            Err(upset) => return give_up(upset, inputs, out),
+            Err(upset) => return give_up(now, upset, inputs, out),
         };
         if flight.landing.is_some() {
-            return landing(flight, reason, inputs, out);
+            return landing(now, flight, reason, inputs, out);
         }
         flight.keep_speed(inputs, out);
         match flight.watch(now, &position, inputs.parameters) {
@@ -201,14 +203,14 @@ impl Machine {
             Progress::Arrived if self.is_terminal(&flight) => land(flight, reason, out),
             Progress::Arrived => {
                 let decision = self.deliberation(now, State::Homing, &flight, inputs).homeward();
-                let Some(decision) = decision else { return fault(Fault::NoWayHome, inputs, out) };
+                let Some(decision) = decision else { return fault(now, Fault::NoWayHome, inputs, out) };
                 self.follow(now, &mut flight, decision, inputs, out);
                 Phase::Homing(flight, reason)
             }
             Progress::Stalled => {
                 flight.stalls += 1;
                 if flight.stalls >= STALLS {
-                    return fault(Fault::NoProgress, inputs, out);
+                    return fault(now, Fault::NoProgress, inputs, out);
                 }
                 out.say(Severity::Warning, format_args!("gleaner: {}", ReturnReason::NoProgress.text()));
                 Phase::Homing(flight, reason)
@@ -290,7 +292,13 @@ fn land(mut flight: Flight, reason: ReturnReason, out: &mut Outputs) -> Phase {
 
 /// Over the terminal, until the autopilot confirms that it lands. The target stays: on PX4 a silent stream
 /// would be a failsafe.
-fn landing(mut flight: Flight, reason: ReturnReason, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+fn landing(
+    now: Instant,
+    mut flight: Flight,
+    reason: ReturnReason,
+    inputs: &Inputs<'_>,
+    out: &mut Outputs,
+) -> Phase {
     let answer = |accepted| inputs.ended.contains(&(AutopilotCommand::Land, accepted));
     if answer(true) {
         return Phase::Done { landed: false };
@@ -298,7 +306,7 @@ fn landing(mut flight: Flight, reason: ReturnReason, inputs: &Inputs<'_>, out: &
     if answer(false) {
         let attempts = flight.landing.unwrap_or(0);
         if attempts >= ATTEMPTS {
-            return fault(Fault::LandingRefused, inputs, out);
+            return fault(now, Fault::LandingRefused, inputs, out);
         }
         flight.landing = Some(attempts + 1);
         out.command = Some(AutopilotCommand::Land);
@@ -306,57 +314,72 @@ fn landing(mut flight: Flight, reason: ReturnReason, inputs: &Inputs<'_>, out: &
     Phase::Homing(flight, reason)
 }
 
-fn give_up(upset: Upset, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+fn give_up(now: Instant, upset: Upset, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
     match upset {
         Upset::Taken => Phase::Passive,
         Upset::Landing => Phase::Done { landed: !inputs.vehicle.armed },
         Upset::Disarmed => Phase::Idle,
-        Upset::Fault(kind) => fault(kind, inputs, out),
+        Upset::Fault(kind) => fault(now, kind, inputs, out),
     }
 }
 
-fn fault(fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
-    HandBack { attempts: 0, waiting: false }.step(fault, inputs, out)
+fn fault(now: Instant, fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+    HandBack { ask_at: Some(now), waiting: false, failures: 0 }.step(now, fault, inputs, out)
 }
 
-/// After a fault in flight: the aircraft is given back to the autopilot by one request to return to launch.
+/// After a fault in flight: the aircraft is given back to the autopilot by a request to return to launch.
 ///
-/// ArduCopter never forgets a position target: without this it would hover until its battery is empty. PX4
-/// returns by itself one second after the targets stop. The request goes out only while heartbeats still show
-/// that the aircraft is ours (armed, GUIDED or OFFBOARD); any other mode ends it for good, since then someone
-/// else has the aircraft. It is the same safe way out for all faults: the estimator's failsafe overrides it
-/// where a position is needed and missing.
+/// ArduCopter never forgets a position target: without this it would hover until its battery is empty. So the request
+/// is repeated until it is accepted, however long the line is bad. PX4 returns by itself one second after the targets
+/// stop. The request goes out only while heartbeats still show that the aircraft is ours (armed, GUIDED or OFFBOARD);
+/// any other mode ends it for good, since then someone else has the aircraft. It is the same safe way out for all
+/// faults: the estimator's failsafe overrides it where a position is needed and missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct HandBack {
-    attempts: u8,
+    /// When it may be asked again; `None` once there is nothing to give back.
+    ask_at: Option<Instant>,
     waiting: bool,
+    failures: u8,
 }
 
 impl HandBack {
     /// There is nothing to give back.
     pub(crate) const fn nothing() -> HandBack {
-        HandBack { attempts: ATTEMPTS, waiting: false }
+        HandBack { ask_at: None, waiting: false, failures: 0 }
     }
 
-    pub(crate) fn step(mut self, fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+    pub(crate) fn step(
+        mut self,
+        now: Instant,
+        fault: Fault,
+        inputs: &Inputs<'_>,
+        out: &mut Outputs,
+    ) -> Phase {
         let vehicle = inputs.vehicle;
-        for (_, accepted) in
-            inputs.ended.iter().filter(|(command, _)| *command == AutopilotCommand::ReturnToLaunch)
-        {
-            self.waiting = false;
-            if *accepted {
-                self = HandBack::nothing();
-            }
+        let returns = inputs.ended.iter().filter(|(command, _)| *command == AutopilotCommand::ReturnToLaunch);
+        for (_, accepted) in returns {
+            self = if *accepted { HandBack::nothing() } else { self.failed(now, out) };
         }
         if vehicle.is_taken() || inputs.other_mode_seen || (vehicle.mode.is_some() && !vehicle.armed) {
             out.withdraw |= self.waiting;
             self = HandBack::nothing();
         }
-        if vehicle.is_guided() && !self.waiting && self.attempts < ATTEMPTS {
-            self.attempts += 1;
+        if vehicle.is_guided() && !self.waiting && self.ask_at.is_some_and(|at| now >= at) {
             self.waiting = true;
             out.command = Some(AutopilotCommand::ReturnToLaunch);
         }
         Phase::Fault(fault, self)
+    }
+
+    /// Refused, or three times not answered.
+    fn failed(self, now: Instant, out: &mut Outputs) -> HandBack {
+        if self.ask_at.is_none() {
+            return self;
+        }
+        let failures = self.failures.saturating_add(1);
+        if failures == ATTEMPTS {
+            out.say(Severity::Critical, format_args!("gleaner: autopilot does not return, take over"));
+        }
+        HandBack { ask_at: Some(now + ASK_AGAIN), waiting: false, failures }
     }
 }

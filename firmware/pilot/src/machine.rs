@@ -118,7 +118,7 @@ impl Machine {
             Phase::Homing(flight, reason) => self.homing(now, flight, reason, late, inputs, &mut out),
             Phase::Done { landed } => done(landed, inputs.vehicle),
             Phase::Passive => Phase::Passive,
-            Phase::Fault(fault, hand_back) => hand_back.step(fault, inputs, &mut out),
+            Phase::Fault(fault, hand_back) => hand_back.step(now, fault, inputs, &mut out),
             Phase::Shadow(watch) => self.shadow(now, watch, inputs, policy, &mut out),
         };
         self.send_target(now, inputs.vehicle, &mut out);

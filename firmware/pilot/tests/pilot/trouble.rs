@@ -90,13 +90,25 @@ fn a_silent_autopilot_is_a_fault_and_is_asked_to_return_when_it_is_back_in_our_m
 }
 
 #[test]
-fn a_refused_return_is_asked_for_three_times() {
-    let mut rig = Rig::engaged();
-    rig.run(1.0);
-    rig.accepts = Some(false);
-    rig.vehicle.position = None;
-    rig.run(20.0);
-    assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 3);
+fn a_return_that_is_not_accepted_is_asked_for_until_it_is_or_someone_takes_over() {
+    for accepted in [true, false] {
+        let mut rig = Rig::engaged();
+        rig.run(1.0);
+        rig.accepts = Some(false);
+        rig.vehicle.position = None;
+        rig.run(60.0);
+        let asked = rig.commanded(AutopilotCommand::ReturnToLaunch);
+        assert!((29..=31).contains(&asked), "every two seconds: {asked}");
+        assert_eq!(rig.said("autopilot does not return, take over"), 1);
+        if accepted {
+            rig.accepts = Some(true);
+        } else {
+            rig.vehicle.mode = Some(FlightMode::Hold);
+        }
+        rig.run(60.0);
+        let more = rig.commanded(AutopilotCommand::ReturnToLaunch) - asked;
+        assert!(more <= usize::from(accepted), "{more}");
+    }
 }
 
 #[test]
