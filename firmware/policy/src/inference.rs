@@ -16,6 +16,14 @@ pub trait Policy {
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, Self::Error>;
 }
 
+impl<P: Policy> Policy for &mut P {
+    type Error = P::Error;
+
+    fn infer(&mut self, tokens: &Tokens) -> Result<Inference, P::Error> {
+        (**self).infer(tokens)
+    }
+}
+
 /// One answer of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inference {

@@ -6,10 +6,12 @@ use crate::mission::{PlanError, Staged};
 use crate::operator::{Operator, Orders, Switch};
 use crate::referee::Violation;
 use crate::simulation::Simulation;
+use crate::wires::WireFault;
 use gleaner_pilot::{Onboard, OnboardError, Parameters, Settings, State};
 use gleaner_policy::{Policy, SelfTestError};
 use gleaner_units::{BatteryUnits, Duration, Instant};
 use gleaner_world::ScenarioKind;
+use std::fmt;
 use thiserror::Error;
 
 /// What the operator wants of a flight.
@@ -53,6 +55,48 @@ pub enum IncidentKind {
     LosesBattery(BatteryUnits),
     /// The autopilot's supply fails for a moment.
     AutopilotReboots,
+    /// Something is wrong with a wire for so long.
+    Wire(WireFault, Duration),
+}
+
+impl IncidentKind {
+    /// What happens, in two words.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            IncidentKind::PilotSelects(_) => "pilot takes over",
+            IncidentKind::Fence(_) => "fence",
+            IncidentKind::Voltage(_) => "low voltage",
+            IncidentKind::LosesBattery(_) => "charge lost",
+            IncidentKind::AutopilotReboots => "autopilot reboots",
+            IncidentKind::Wire(WireFault::RadioSilent, _) => "radio silent",
+            IncidentKind::Wire(WireFault::LineCut, _) => "line cut",
+            IncidentKind::Wire(WireFault::LineNoise(_), _) => "line noise",
+        }
+    }
+
+    /// Battery units that it takes beyond what the decisions pay: a reserve that covers them brings the aircraft home.
+    pub(crate) const fn takes(&self) -> BatteryUnits {
+        match self {
+            IncidentKind::LosesBattery(units) => *units,
+            // Back from the far end of RD, after some slots before the fence.
+            IncidentKind::Fence(_) => BatteryUnits(38.0),
+            _ => BatteryUnits(0.0),
+        }
+    }
+}
+
+impl fmt::Display for IncidentKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            IncidentKind::PilotSelects(mode) => write!(f, "the pilot selects {}", mode.name()),
+            IncidentKind::Fence(radius_m) => write!(f, "a fence of {radius_m} m around home is switched on"),
+            IncidentKind::Voltage(volts) => write!(f, "the voltage drops to {volts} V"),
+            IncidentKind::LosesBattery(units) => write!(f, "the pack loses {} battery units", units.0),
+            IncidentKind::AutopilotReboots => write!(f, "the autopilot reboots"),
+            IncidentKind::Wire(fault, lasts) => write!(f, "{fault} for {:.0} s", lasts.as_secs_f32()),
+        }
+    }
 }
 
 /// Why a flight could not be flown at all.
@@ -280,6 +324,7 @@ pub fn fly<P: Policy>(
 fn happen(simulation: &mut Simulation, kind: IncidentKind) {
     let copter = simulation.copter_mut();
     match kind {
+        IncidentKind::Wire(fault, lasts) => simulation.fail_wire(fault, lasts),
         IncidentKind::PilotSelects(mode) => copter.pilot_selects(mode),
         IncidentKind::Voltage(volts) => copter.set_voltage(volts),
         IncidentKind::LosesBattery(units) => copter.lose_battery(units),

@@ -20,6 +20,7 @@
 //! - **staged**: a mission laid out, before anything moves ([`Staged`]).
 //! - **operator**: the scripted ground station ([`Operator`]).
 //! - **incident**: something that happens to the aircraft during a flight.
+//! - **trial**: a mission with its incidents, drawn from a number ([`Trial`]).
 //! - **haste**: how many seconds the aircraft lives while its pilot's clock counts one.
 //!
 //! # When you may trust it
@@ -41,8 +42,10 @@ mod picture;
 pub mod program;
 mod referee;
 mod simulation;
+mod trial;
 mod wire;
 mod wired;
+mod wires;
 
 pub use aboard::Aboard;
 pub use autopilot::{Copter, CopterMode, CopterSettings, LinkId, Pack, Truth};
@@ -55,4 +58,6 @@ pub use pace::Pace;
 pub use picture::trajectory;
 pub use referee::{Breach, Referee, Violation};
 pub use simulation::Simulation;
+pub use trial::Trial;
 pub use wired::{Wired, fly_wired};
+pub use wires::WireFault;

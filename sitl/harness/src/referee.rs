@@ -115,6 +115,8 @@ pub struct Referee {
     expected: Option<u32>,
     /// Whether the pilot's decisions are being flown now.
     flying: bool,
+    /// Whether the autopilot flies home.
+    returning: bool,
     ignored_targets: u32,
     other_mode_since: Option<Instant>,
     excursions: Excursions,
@@ -155,6 +157,7 @@ impl Referee {
             decisions: 0,
             expected: None,
             flying: false,
+            returning: false,
             ignored_targets: 0,
             other_mode_since: None,
             excursions: Excursions::default(),
@@ -243,12 +246,17 @@ impl Referee {
     fn watch_mode(&mut self, now: Instant, truth: &Truth) {
         match truth.mode {
             _ if !truth.speaks => self.other_mode_since = None,
-            CopterMode::Guided => self.other_mode_since = None,
+            CopterMode::Guided => {
+                self.other_mode_since = None;
+                // Back from the autopilot's own way home: whose it is now, a decision will tell.
+                self.flying &= !std::mem::take(&mut self.returning);
+            }
             CopterMode::Land => {}
             _ => {
                 self.other_mode_since.get_or_insert(now);
             }
         }
+        self.returning |= truth.mode == CopterMode::Rtl;
         if truth.mode != CopterMode::Guided && truth.mode != CopterMode::Land {
             // Somebody else has it: where it lands is theirs.
             self.flying &= truth.mode == CopterMode::Rtl;

@@ -6,11 +6,12 @@ use crate::mission::{PlanError, Staged};
 use crate::modem::Modem;
 use crate::referee::Referee;
 use crate::wire::{parse, relayed};
+use crate::wires::{WireFault, Wires};
 use gleaner_link::{Frame, FrameDecoder, Message, TUNNEL_DECISION};
 use gleaner_pilot::DecisionRecord;
 use gleaner_policy::DeviceState;
 use gleaner_radio::Report;
-use gleaner_units::{Instant, Ned};
+use gleaner_units::{Duration, Instant, Ned};
 use gleaner_world::Field;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_VALUE_DATA};
@@ -24,6 +25,7 @@ pub struct Simulation {
     modem: Modem,
     referee: Referee,
     journal: Journal,
+    wires: Wires,
     /// Listens to what the companion says.
     tap: FrameDecoder,
     /// The same for the ground station, for the log.
@@ -44,6 +46,7 @@ impl Simulation {
         let referee = Referee::new(&staged, guard);
         Ok(Simulation {
             copter: Copter::new(staged.copter),
+            wires: Wires::new(staged.plan.seed),
             now: Instant::ZERO,
             modem,
             referee,
@@ -85,7 +88,7 @@ impl Simulation {
                 self.overhear(&frame);
             }
         }
-        self.copter.receive(LinkId::COMPANION, all);
+        self.copter.receive(LinkId::COMPANION, &self.wires.carry(now, all.to_vec()));
     }
 
     /// What the ground station sends.
@@ -104,7 +107,8 @@ impl Simulation {
 
     /// Frames from the autopilot for the companion.
     pub fn to_companion(&mut self) -> Vec<Vec<u8>> {
-        self.copter.transmit(LinkId::COMPANION)
+        let frames = self.copter.transmit(LinkId::COMPANION);
+        frames.into_iter().map(|frame| self.wires.carry(self.now, frame)).collect()
     }
 
     /// Frames from the vehicle for the ground station.
@@ -129,7 +133,8 @@ impl Simulation {
 
     /// Reports from the radio modem that are due.
     pub fn radio(&mut self) -> Vec<Report> {
-        self.modem.reports(self.now)
+        let reports = self.modem.reports(self.now);
+        if self.wires.radio_is_silent(self.now) { Vec::new() } else { reports }
     }
 
     fn overhear(&mut self, frame: &Frame) {
@@ -177,6 +182,11 @@ impl Simulation {
                 snr: Some(device.snr).filter(|snr| snr.0.is_finite()),
             })
             .collect()
+    }
+
+    /// Something goes wrong with a wire.
+    pub fn fail_wire(&mut self, fault: WireFault, lasts: Duration) {
+        self.wires.fail(self.now, fault, lasts);
     }
 
     /// The simulated autopilot, for injections.

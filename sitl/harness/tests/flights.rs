@@ -1,7 +1,8 @@
 //! Whole missions through real MAVLink bytes, flown by simple policies.
 
 use gleaner_harness::{
-    CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Staged, Switch, Wishes, fly, trajectory,
+    CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Staged, Switch, WireFault, Wishes, fly,
+    trajectory,
 };
 use gleaner_pilot::State;
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
@@ -179,6 +180,32 @@ fn an_autopilot_that_reboots_in_flight_is_left_alone() {
     assert_eq!(figures.violations, [], "{:?}", texts(&flown));
     assert_eq!(flown.ending, Ending::OnTheGround);
     assert!(!figures.landed && (8..=12).contains(&figures.decisions), "{figures:?}");
+}
+
+#[test]
+fn after_a_fault_the_aircraft_is_handed_back_however_long_the_line_is_bad() {
+    // Now and then a heartbeat comes through and shows that it is still ours; requests and answers are lost.
+    let noise = IncidentKind::Wire(WireFault::LineNoise(8), Duration::from_secs(60));
+    let incidents = vec![Incident { after: Duration::from_secs(20), kind: noise }];
+    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let figures = flown.figures();
+    assert_eq!(figures.violations, [], "{:?}", texts(&flown));
+    assert_eq!((flown.ending, flown.state), (Ending::OnTheGround, Some(State::Fault)), "{:?}", texts(&flown));
+    assert_eq!(flown.simulation.truth().mode, CopterMode::Rtl, "handed back to the autopilot");
+    // What the pilot said; on the noisy line the operator need not have heard it.
+    let said = |frame: &[u8]| frame.windows(14).any(|part| part == b"gleaner: fault");
+    let lost = flown.simulation.journal().frames().find(|(_, frame)| said(frame));
+    let (lost_at, _) = lost.expect("a fault");
+    let bad_until = flown.engaged_at.unwrap() + Duration::from_secs(80);
+    assert!(bad_until - lost_at > Duration::from_secs(20), "long enough for every attempt to be lost");
+}
+
+#[test]
+fn a_radio_that_falls_silent_costs_data_and_nothing_else() {
+    let silent = IncidentKind::Wire(WireFault::RadioSilent, Duration::from_secs(60));
+    let incidents = vec![Incident { after: Duration::from_secs(20), kind: silent }];
+    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    assert!(flown.figures().is_good(), "{:?}", texts(&flown));
 }
 
 #[test]

@@ -39,6 +39,28 @@ fn what_cannot_be_done_is_one_line_and_exit_code_2() {
 }
 
 #[test]
+fn a_sweep_finds_nothing_and_says_the_same_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = |more: &[&str]| -> serde_json::Value {
+        let mut command = program();
+        command.args(["sweep", "--flights", "60", "--first", "300", "--json", "--out"]);
+        let output = command.arg(folder.path()).args(more).output().unwrap();
+        assert_eq!(said(&output), (Some(0), String::new()));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let report = sweep(&[]);
+    assert_eq!(report, sweep(&[]), "the same on any number of cores");
+    assert_eq!(report["findings"], serde_json::json!([]));
+    let sum = |report: &serde_json::Value, key: &str| -> u64 {
+        report["rows"].as_object().unwrap().values().map(|row| row[key].as_u64().unwrap()).sum()
+    };
+    let kinds = report["rows"].as_object().unwrap().len();
+    assert!(kinds == 10 && sum(&report, "flights") == 60 && sum(&report, "landed") > 30, "{report}");
+    let calm = sweep(&["--calm"]);
+    assert_eq!(calm["rows"]["none"]["landed"], 60, "{calm}");
+}
+
+#[test]
 fn help_is_no_error() {
     for words in [["--help"], ["--version"]] {
         let output = program().args(words).output().unwrap();

@@ -26,6 +26,37 @@ enum Command {
     Fly(FlyArguments),
     /// Run in real time, with ports for a companion computer, its radio and a ground station.
     Serve(ServeArguments),
+    /// Fly many missions in virtual time, drawn by number, in which things go wrong: the pilot takes over, charge is
+    /// lost, the autopilot reboots, lines are cut or noisy, the radio is silent. Says which flight broke a rule.
+    Sweep(SweepArguments),
+}
+
+#[derive(Debug, Args)]
+struct SweepArguments {
+    /// How many flights.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    flights: u64,
+    /// Number of the first flight; the others follow.
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
+    first: u64,
+    /// The same missions, and nothing goes wrong.
+    #[arg(long)]
+    calm: bool,
+    /// The model [default: models/gleaner.onnx].
+    #[arg(long, value_name = "PATH")]
+    model: Option<PathBuf>,
+    /// What runs the model: tract or native.
+    #[arg(long, value_name = "ENGINE", default_value = "native")]
+    engine: EngineKind,
+    /// Print one JSON object instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Folder for trajectory.svg, flight.tlog and decisions.jsonl of each flight that broke a rule.
+    #[arg(long, value_name = "DIR", default_value = "gleaner-sweep")]
+    out: PathBuf,
+    /// Write these files for every flight.
+    #[arg(long)]
+    keep: bool,
 }
 
 #[derive(Debug, Args)]
@@ -126,6 +157,20 @@ struct ServeArguments {
 pub(crate) enum Task {
     Fly(FlyOrder),
     Serve(ServeOrder),
+    Sweep(SweepOrder),
+}
+
+/// Many missions in virtual time.
+#[derive(Debug)]
+pub(crate) struct SweepOrder {
+    pub flights: u64,
+    pub first: u64,
+    pub calm: bool,
+    pub model: Option<PathBuf>,
+    pub engine: EngineKind,
+    pub json: bool,
+    pub out: PathBuf,
+    pub keep: bool,
 }
 
 /// One mission: in virtual time without a board.
@@ -200,6 +245,7 @@ impl Arguments {
         match command {
             Some(Command::Fly(arguments)) => Task::Fly(arguments.order()),
             Some(Command::Serve(arguments)) => Task::Serve(arguments.order()),
+            Some(Command::Sweep(arguments)) => Task::Sweep(arguments.order()),
             None => unreachable!("the demonstration is a command; a test says so"),
         }
     }
@@ -257,6 +303,13 @@ impl ServeArguments {
     }
 }
 
+impl SweepArguments {
+    fn order(self) -> SweepOrder {
+        let SweepArguments { flights, first, calm, model, engine, json, out, keep } = self;
+        SweepOrder { flights, first, calm, model, engine, json, out, keep }
+    }
+}
+
 /// The cause without the usage and the tips that follow it.
 fn one_line(text: &str) -> String {
     let cause = text.split("\n\n").next().unwrap_or(text);
@@ -304,7 +357,7 @@ mod tests {
         let all = ["gleaner-sitl", "fly"].iter().chain(words);
         match Arguments::try_parse_from(all).unwrap().task() {
             Task::Fly(order) => order,
-            Task::Serve(_) => panic!("fly was typed"),
+            Task::Serve(_) | Task::Sweep(_) => panic!("fly was typed"),
         }
     }
 

@@ -6,6 +6,7 @@ mod introduction;
 mod model;
 mod results;
 mod serve;
+mod sweep;
 
 pub use arguments::Arguments;
 
@@ -72,5 +73,6 @@ pub fn run(arguments: Arguments) -> Result<bool, ProgramError> {
     match arguments.task() {
         Task::Fly(order) => fly::fly(&order),
         Task::Serve(order) => serve::serve(&order),
+        Task::Sweep(order) => sweep::sweep(&order),
     }
 }
