@@ -33,6 +33,12 @@ pub enum Command {
     Bench(Bench),
     /// Convert a model for the native engine, and let it prove itself there.
     Convert(Conversion),
+    /// List the parameters that a ground station will see, with the values that a configuration gives them.
+    Params {
+        /// Configuration file; without it the values of a fresh installation.
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+    },
     /// Decide a decision log again, with the model that flew or with another one, and say what is decided otherwise.
     Replay(Replay),
 }

@@ -108,6 +108,17 @@ pub fn resolve(setup: &Setup) -> Result<Config, ConfigError> {
     }
 }
 
+/// The parameters that the file at `path` sets, the others as they are by default; nothing else of it is checked.
+///
+/// # Errors
+/// The file cannot be read, is no configuration, or holds a parameter out of its range.
+pub fn parameters(path: &Path) -> Result<Parameters, ConfigError> {
+    let text =
+        fs::read_to_string(path).map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+    let source = Source { path, text: &text };
+    source.parameters(&source.parse()?.parameters)
+}
+
 /// The file that values came from, to say where a fault is and what paths are relative to.
 struct Source<'s> {
     path: &'s Path,
@@ -115,10 +126,7 @@ struct Source<'s> {
 }
 
 fn merge(setup: &Setup, source: &Source<'_>) -> Result<Config, ConfigError> {
-    let file: File = toml::from_str(source.text).map_err(|error| {
-        let offset = error.span().map_or(0, |span| span.start);
-        source.fault(offset, error.message().replace('\n', " "))
-    })?;
+    let file = source.parse()?;
     let folder = source.path.parent().unwrap_or(Path::new(""));
     let path = |flag: &Option<PathBuf>, key: &Option<PathBuf>| {
         flag.clone().or_else(|| key.as_ref().map(|path| folder.join(path)))
@@ -145,6 +153,13 @@ fn merge(setup: &Setup, source: &Source<'_>) -> Result<Config, ConfigError> {
 }
 
 impl Source<'_> {
+    fn parse(&self) -> Result<File, ConfigError> {
+        toml::from_str(self.text).map_err(|error| {
+            let offset = error.span().map_or(0, |span| span.start);
+            self.fault(offset, error.message().replace('\n', " "))
+        })
+    }
+
     fn fault(&self, offset: usize, what: String) -> ConfigError {
         let line = 1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
         ConfigError::Line { path: self.path.to_owned(), line, what }

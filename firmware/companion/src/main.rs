@@ -15,6 +15,7 @@ mod convert;
 mod error;
 mod load;
 mod log;
+mod params;
 mod replay;
 mod run;
 mod timed;
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
         Ok(args::Command::Bench(order)) => bench::bench(&order),
         Ok(args::Command::Convert(conversion)) => convert::convert(&conversion),
+        Ok(args::Command::Params { config }) => params::params(config.as_deref()),
         Ok(args::Command::Replay(order)) => replay::replay(&order),
         Err(answered) => return answered,
     };

@@ -1,0 +1,25 @@
+//! `gleaner params`: the parameters that a ground station will see, and what a configuration makes of them.
+
+use crate::config;
+use crate::error::StartError;
+use gleaner_link::{PARAMETERS, Parameters};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Prints each parameter with the value that it would have after the start.
+///
+/// # Errors
+/// The configuration cannot be read, or a value in it is out of range.
+pub fn params(config: Option<&Path>) -> Result<ExitCode, StartError> {
+    let parameters = config.map_or_else(|| Ok(Parameters::default()), config::parameters)?;
+    println!("{:<13} {:>6} {:>8}  {:<9} {:<6} meaning", "parameter", "value", "default", "range", "unit");
+    for spec in PARAMETERS {
+        let value = parameters.value(spec.id);
+        let range = format!("{}..{}", spec.min, spec.max);
+        println!(
+            "{:<13} {value:>6} {:>8}  {range:<9} {:<6} {}",
+            spec.name, spec.default, spec.unit, spec.doc
+        );
+    }
+    Ok(ExitCode::SUCCESS)
+}
