@@ -55,6 +55,8 @@ pub enum IncidentKind {
     LosesBattery(BatteryUnits),
     /// The autopilot's supply fails for a moment.
     AutopilotReboots,
+    /// The autopilot's estimator mistrusts itself for so long.
+    EstimatorFails(Duration),
     /// Something is wrong with a wire for so long.
     Wire(WireFault, Duration),
 }
@@ -69,6 +71,7 @@ impl IncidentKind {
             IncidentKind::Voltage(_) => "low voltage",
             IncidentKind::LosesBattery(_) => "charge lost",
             IncidentKind::AutopilotReboots => "autopilot reboots",
+            IncidentKind::EstimatorFails(_) => "estimator fails",
             IncidentKind::Wire(WireFault::RadioSilent, _) => "radio silent",
             IncidentKind::Wire(WireFault::LineCut, _) => "line cut",
             IncidentKind::Wire(WireFault::LineNoise(_), _) => "line noise",
@@ -79,8 +82,10 @@ impl IncidentKind {
     pub(crate) const fn takes(&self) -> BatteryUnits {
         match self {
             IncidentKind::LosesBattery(units) => *units,
-            // Back from the far end of RD, after some slots before the fence.
-            IncidentKind::Fence(_) => BatteryUnits(38.0),
+            // Some slots of waiting, and back to the start from the far end of RD.
+            IncidentKind::Fence(_) | IncidentKind::Wire(WireFault::LineCut | WireFault::LineNoise(_), _) => {
+                BatteryUnits(38.0)
+            }
             _ => BatteryUnits(0.0),
         }
     }
@@ -94,6 +99,9 @@ impl fmt::Display for IncidentKind {
             IncidentKind::Voltage(volts) => write!(f, "the voltage drops to {volts} V"),
             IncidentKind::LosesBattery(units) => write!(f, "the pack loses {} battery units", units.0),
             IncidentKind::AutopilotReboots => write!(f, "the autopilot reboots"),
+            IncidentKind::EstimatorFails(lasts) => {
+                write!(f, "the estimator mistrusts itself for {:.1} s", lasts.as_secs_f32())
+            }
             IncidentKind::Wire(fault, lasts) => write!(f, "{fault} for {:.0} s", lasts.as_secs_f32()),
         }
     }
@@ -329,6 +337,7 @@ fn happen(simulation: &mut Simulation, kind: IncidentKind) {
         IncidentKind::Voltage(volts) => copter.set_voltage(volts),
         IncidentKind::LosesBattery(units) => copter.lose_battery(units),
         IncidentKind::AutopilotReboots => copter.reboot(),
+        IncidentKind::EstimatorFails(lasts) => copter.estimator_fails(lasts),
         IncidentKind::Fence(radius_m) => {
             for (name, value) in [("FENCE_TYPE", 2.0), ("FENCE_RADIUS", radius_m), ("FENCE_ENABLE", 1.0)] {
                 copter.set_parameter(name, value);

@@ -115,8 +115,8 @@ pub struct Referee {
     expected: Option<u32>,
     /// Whether the pilot's decisions are being flown now.
     flying: bool,
-    /// Whether the autopilot flies home.
-    returning: bool,
+    /// Whether the autopilot flies home or lands.
+    leaving: bool,
     ignored_targets: u32,
     other_mode_since: Option<Instant>,
     excursions: Excursions,
@@ -157,7 +157,7 @@ impl Referee {
             decisions: 0,
             expected: None,
             flying: false,
-            returning: false,
+            leaving: false,
             ignored_targets: 0,
             other_mode_since: None,
             excursions: Excursions::default(),
@@ -248,16 +248,17 @@ impl Referee {
             _ if !truth.speaks => self.other_mode_since = None,
             CopterMode::Guided => {
                 self.other_mode_since = None;
-                // Back from the autopilot's own way home: whose it is now, a decision will tell.
-                self.flying &= !std::mem::take(&mut self.returning);
+                // Called back from its way home or down: whose it is now, a decision will tell.
+                self.flying &= !std::mem::take(&mut self.leaving);
             }
-            CopterMode::Land => {}
+            CopterMode::Land if truth.mode_is_companions => {}
             _ => {
                 self.other_mode_since.get_or_insert(now);
             }
         }
-        self.returning |= truth.mode == CopterMode::Rtl;
-        if truth.mode != CopterMode::Guided && truth.mode != CopterMode::Land {
+        self.leaving |= matches!(truth.mode, CopterMode::Rtl | CopterMode::Land);
+        let lands = truth.mode == CopterMode::Land && truth.mode_is_companions;
+        if truth.mode != CopterMode::Guided && !lands {
             // Somebody else has it: where it lands is theirs.
             self.flying &= truth.mode == CopterMode::Rtl;
         }

@@ -18,10 +18,15 @@ pub struct Trial {
     pub wishes: Wishes,
 }
 
-/// Modes in which the human pilot takes the aircraft over. LAND is none of them: the referee could not tell it from a
-/// landing of the pilot on board.
-const TAKE_OVERS: [CopterMode; 5] =
-    [CopterMode::Stabilize, CopterMode::AltHold, CopterMode::Loiter, CopterMode::Rtl, CopterMode::Brake];
+/// Modes in which the human pilot takes the aircraft over.
+const TAKE_OVERS: [CopterMode; 6] = [
+    CopterMode::Stabilize,
+    CopterMode::AltHold,
+    CopterMode::Loiter,
+    CopterMode::Rtl,
+    CopterMode::Land,
+    CopterMode::Brake,
+];
 /// The most that `GLN_RESERVE` takes.
 const RESERVE_MAX: f32 = 50.0;
 /// Battery units that take-off and landing take from the pack and no decision pays for.
@@ -82,14 +87,15 @@ fn seconds(rng: &mut impl Rng, range: std::ops::RangeInclusive<u64>) -> Duration
 /// An incident, and what belongs to it.
 fn happens(rng: &mut impl Rng) -> Vec<Incident> {
     let after = seconds(rng, 1..=250);
-    let fails = |fault, rng: &mut _| IncidentKind::Wire(fault, seconds(rng, 1..=60));
-    let kind = match rng.random_range(0..8) {
+    let fails = |fault, rng: &mut _| IncidentKind::Wire(fault, seconds(rng, 1..=30));
+    let kind = match rng.random_range(0..9) {
         0 => IncidentKind::PilotSelects(TAKE_OVERS[rng.random_range(0..TAKE_OVERS.len())]),
         1 => IncidentKind::Fence(f32::from(rng.random_range(100..=600_u16))),
         2 => IncidentKind::Voltage(10.2),
         3 => IncidentKind::LosesBattery(BatteryUnits(f32::from(rng.random_range(1..=20_u8)))),
         4 => IncidentKind::AutopilotReboots,
-        5 => fails(WireFault::RadioSilent, rng),
+        5 => IncidentKind::EstimatorFails(Duration::from_millis(rng.random_range(200..=10_000))),
+        8 => fails(WireFault::RadioSilent, rng),
         6 => fails(WireFault::LineCut, rng),
         _ => {
             let one_in = [30, 100, 1000][rng.random_range(0..3)];
@@ -122,7 +128,7 @@ mod tests {
                 trial.wishes.incidents.into_iter().map(|incident| incident.kind.name())
             })
             .collect();
-        assert_eq!(names.len(), 8, "{names:?}");
+        assert_eq!(names.len(), 9, "{names:?}");
     }
 
     #[test]

@@ -201,6 +201,20 @@ fn after_a_fault_the_aircraft_is_handed_back_however_long_the_line_is_bad() {
 }
 
 #[test]
+fn an_estimator_that_fails_for_a_moment_is_waited_for_and_the_autopilots_landing_is_its_own() {
+    for (millis, is_good) in [(800, true), (5_000, false)] {
+        let kind = IncidentKind::EstimatorFails(Duration::from_millis(millis));
+        let incidents = vec![Incident { after: Duration::from_secs(20), kind }];
+        let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+        let figures = flown.figures();
+        assert_eq!(figures.violations, [], "{:?}", texts(&flown));
+        assert_eq!((flown.ending, figures.landed), (Ending::OnTheGround, is_good), "{:?}", texts(&flown));
+        let state = if is_good { State::Done } else { State::Passive };
+        assert_eq!(flown.state, Some(state), "{:?}", texts(&flown));
+    }
+}
+
+#[test]
 fn a_radio_that_falls_silent_costs_data_and_nothing_else() {
     let silent = IncidentKind::Wire(WireFault::RadioSilent, Duration::from_secs(60));
     let incidents = vec![Incident { after: Duration::from_secs(20), kind: silent }];

@@ -85,10 +85,10 @@ impl Copter {
         match name {
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if p1 == 1.0 => self.arm(p2 == FORCE),
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.disarm_on_request(p2 == FORCE),
-            MavCmd::MAV_CMD_DO_SET_MODE => self.change_mode(p2 as u32),
+            MavCmd::MAV_CMD_DO_SET_MODE => self.change_mode(link, p2 as u32),
             MavCmd::MAV_CMD_NAV_TAKEOFF => self.take_off(p7),
-            MavCmd::MAV_CMD_NAV_LAND => self.change_mode(CopterMode::Land.number()),
-            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => self.change_mode(CopterMode::Rtl.number()),
+            MavCmd::MAV_CMD_NAV_LAND => self.change_mode(link, CopterMode::Land.number()),
+            MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH => self.change_mode(link, CopterMode::Rtl.number()),
             MavCmd::MAV_CMD_DO_CHANGE_SPEED => self.change_speed(p1, p2),
             MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => {
                 let now = self.now;
@@ -140,7 +140,7 @@ impl Copter {
         MAV_RESULT_ACCEPTED
     }
 
-    fn change_mode(&mut self, custom_mode: u32) -> MavResult {
+    fn change_mode(&mut self, link: LinkId, custom_mode: u32) -> MavResult {
         match CopterMode::from_number(custom_mode) {
             None => {
                 self.say(MavSeverity::MAV_SEVERITY_WARNING, &format!("No such mode {custom_mode}"));
@@ -152,7 +152,7 @@ impl Copter {
                 MAV_RESULT_FAILED
             }
             Some(mode) => {
-                self.enter(mode);
+                self.enter(mode, link == LinkId::COMPANION);
                 MAV_RESULT_ACCEPTED
             }
         }
@@ -162,7 +162,7 @@ impl Copter {
     fn set_mode(&mut self, link: LinkId, frame: &Frame) {
         let byte = |at: usize| frame.payload().get(at).copied().unwrap_or(0);
         let custom_mode = u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]);
-        let result = self.change_mode(custom_mode);
+        let result = self.change_mode(link, custom_mode);
         self.acknowledge(link, SET_MODE as u16, result, frame.sender);
     }
 

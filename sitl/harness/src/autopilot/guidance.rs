@@ -38,6 +38,8 @@ const SPIN_UP: Duration = Duration::from_millis(3_300);
 const LAND_DETECTION: Duration = Duration::from_millis(1_500);
 /// The estimator has found itself.
 const ESTIMATOR_READY: Instant = Instant::from_millis(8_000);
+/// How long it may mistrust itself in flight.
+const ESTIMATOR_FAILSAFE: Duration = Duration::from_secs(1);
 /// How long the position estimate's wander remembers itself.
 const WANDER_TIME_S: f64 = 8.0;
 
@@ -53,7 +55,22 @@ impl Copter {
     }
 
     pub(super) fn estimator_ready(&self) -> bool {
-        self.now >= ESTIMATOR_READY
+        let is_lost = self.estimator_lost.is_some_and(|(from, to)| (from..to).contains(&self.now));
+        self.now >= ESTIMATOR_READY && !is_lost
+    }
+
+    /// Whether the estimator has mistrusted itself for so long that the autopilot does not rely on it.
+    pub(super) fn estimator_failsafe(&self) -> bool {
+        let since = self.estimator_lost.map(|(from, _)| from).filter(|_| !self.estimator_ready());
+        since.is_some_and(|from| self.now - from > ESTIMATOR_FAILSAFE)
+    }
+
+    fn check_estimator(&mut self) {
+        let relies = self.mode == CopterMode::Guided || self.mode.needs_position();
+        if self.armed && !self.on_ground && relies && self.estimator_failsafe() {
+            self.say(MavSeverity::MAV_SEVERITY_CRITICAL, "EKF Failsafe: changed to LAND Mode");
+            self.enter(CopterMode::Land, false);
+        }
     }
 
     fn tick(&mut self) {
@@ -66,6 +83,7 @@ impl Copter {
         }
         self.battery.draw((!self.on_ground).then(|| self.body.ground_speed_mps()));
         self.check_battery();
+        self.check_estimator();
         self.check_ground();
     }
 
@@ -227,16 +245,19 @@ impl Copter {
         self.say(MavSeverity::MAV_SEVERITY_WARNING, &text);
         self.say(MavSeverity::MAV_SEVERITY_WARNING, "Battery Failsafe");
         match action as u8 {
-            1 => self.enter(CopterMode::Land),
-            2 => self.enter(CopterMode::Rtl),
+            1 => self.enter(CopterMode::Land, false),
+            2 => self.enter(CopterMode::Rtl, false),
             _ => {}
         }
     }
 
-    /// Changes the mode, whoever asks; the heartbeat says so at once.
-    pub(super) fn enter(&mut self, mode: CopterMode) {
+    /// Changes the mode, whoever asks; the heartbeat says so at once. Who asks for what is so already changes nothing.
+    pub(super) fn enter(&mut self, mode: CopterMode, by_companion: bool) {
         let changed = self.mode != mode;
         self.mode = mode;
+        if changed {
+            self.mode_is_companions = by_companion;
+        }
         if changed || mode != CopterMode::Guided {
             self.guidance = match mode {
                 CopterMode::Rtl => Guidance::Return { over_home_until: None },

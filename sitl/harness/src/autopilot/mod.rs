@@ -9,6 +9,8 @@
 //! - **Modes** change at once and a heartbeat says so at once. Nothing but a command or the pilot changes them back:
 //!   `DO_SET_MODE` GUIDED is accepted even during a failsafe. The restraint must be the companion's.
 //! - **Battery failsafe**: latched, once per level.
+//! - **Estimator failsafe**: LAND, a second after the estimator mistrusts itself (`FS_EKF_ACTION` 1). From ArduPilot's
+//!   documentation, not measured; the aircraft does not drift.
 //! - **Not a number** in a target ends the simulation, as it ends ArduPilot's ([`Truth::killed_by_nan`]).
 //! - **Routing**: messages pass between the links as ArduPilot passes them, to those who have spoken.
 //!
@@ -97,6 +99,8 @@ pub struct Truth {
     pub on_ground: bool,
     /// Flight mode.
     pub mode: CopterMode,
+    /// Whether the pilot on board asked for it, not the human pilot, the ground station or a failsafe.
+    pub mode_is_companions: bool,
     /// What the battery holds.
     pub battery: BatteryUnits,
     /// Whether a target that was not a number has ended it: it is silent since.
@@ -126,6 +130,7 @@ pub struct Copter {
     routes: Routes,
     parameters: ParameterTable,
     mode: CopterMode,
+    mode_is_companions: bool,
     guidance: Guidance,
     armed: bool,
     armed_at: Instant,
@@ -137,6 +142,8 @@ pub struct Copter {
     /// Horizontal speed in force, m/s.
     cruise_mps: f64,
     home: Option<Ned>,
+    /// From when to when the estimator mistrusts itself.
+    estimator_lost: Option<(Instant, Instant)>,
     battery: Battery,
     /// The estimate is this far from the truth.
     wander: [f64; 3],
@@ -167,6 +174,7 @@ impl Copter {
             routes: Routes::default(),
             parameters: ParameterTable::new(settings.system_id),
             mode: CopterMode::Stabilize,
+            mode_is_companions: false,
             guidance: Guidance::Halt,
             armed: false,
             armed_at: Instant::ZERO,
@@ -176,6 +184,7 @@ impl Copter {
             heading: [1.0, 0.0],
             cruise_mps: 10.0,
             home: None,
+            estimator_lost: None,
             battery: Battery::new(settings.pack),
             wander: [0.0; 3],
             rng: rand::SeedableRng::seed_from_u64(settings.seed),
@@ -207,12 +216,17 @@ impl Copter {
 
     /// The human pilot turns the mode switch.
     pub fn pilot_selects(&mut self, mode: CopterMode) {
-        self.enter(mode);
+        self.enter(mode, false);
     }
 
     /// The human pilot turns the dial on RC channel 6, microseconds.
     pub fn pilot_turns_dial(&mut self, pulse_us: u16) {
         self.rc_dial_us = pulse_us;
+    }
+
+    /// The estimator mistrusts itself for so long: the position is still told, and no longer vouched for.
+    pub fn estimator_fails(&mut self, lasts: Duration) {
+        self.estimator_lost = Some((self.now, self.now + lasts));
     }
 
     /// The pack's voltage changes to this: below a threshold for its time, the failsafe begins.
@@ -259,6 +273,7 @@ impl Copter {
             armed: self.armed,
             on_ground: self.on_ground,
             mode: self.mode,
+            mode_is_companions: self.mode_is_companions,
             battery: self.battery.left(),
             killed_by_nan: self.killed_by_nan,
             speaks: self.now >= self.speaks_from,

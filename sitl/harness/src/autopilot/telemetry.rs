@@ -62,9 +62,9 @@ impl Copter {
     }
 
     fn system_status(&self) -> MavState {
-        if self.battery.level() > Level::Fine {
+        if self.battery.level() > Level::Fine || self.estimator_failsafe() {
             MavState::MAV_STATE_CRITICAL
-        } else if !self.estimator_ready() {
+        } else if self.home.is_none() {
             MavState::MAV_STATE_BOOT
         } else if self.on_ground {
             MavState::MAV_STATE_STANDBY
