@@ -38,8 +38,8 @@ struct Row {
     elsewhere: u64,
     /// Never engaged, or still in the air when the simulation gave up.
     stuck: u64,
-    /// With a rule broken.
-    violated: u64,
+    /// With a rule broken, or stuck.
+    findings: u64,
 }
 
 /// A flight with a rule broken, or without an end.
@@ -180,7 +180,7 @@ impl Row {
             taken_over: ended(&[Ending::TakenOver]),
             elsewhere: ended(&[Ending::OnTheGround]),
             stuck: ended(&[Ending::NeverEngaged, Ending::TimeUp, Ending::PilotGone]),
-            violated: u64::from(is_finding),
+            findings: u64::from(is_finding),
         }
     }
 
@@ -190,7 +190,7 @@ impl Row {
         self.taken_over += other.taken_over;
         self.elsewhere += other.elsewhere;
         self.stuck += other.stuck;
-        self.violated += other.violated;
+        self.findings += other.findings;
     }
 }
 
@@ -199,9 +199,9 @@ impl Report {
         println!("policy {}, engine {}", self.model, self.engine);
         println!("incidents          flights   landed  taken over  elsewhere    stuck  findings");
         for (incidents, row) in &self.rows {
-            let Row { flights, landed, taken_over, elsewhere, stuck, violated } = row;
+            let Row { flights, landed, taken_over, elsewhere, stuck, findings } = row;
             println!(
-                "{incidents:<18} {flights:>7}  {landed:>7}  {taken_over:>10}  {elsewhere:>9}  {stuck:>7}  {violated:>8}"
+                "{incidents:<18} {flights:>7}  {landed:>7}  {taken_over:>10}  {elsewhere:>9}  {stuck:>7}  {findings:>8}"
             );
         }
         for Finding { flight, incidents, what } in &self.findings {
@@ -246,7 +246,7 @@ mod tests {
         let what = faults(&flown);
         assert!(what.iter().any(|line| line.contains("the battery is empty in flight")), "{what:?}");
         let row = Row::of(&flown, true);
-        assert_eq!((row.flights, row.violated), (1, 1));
+        assert_eq!((row.flights, row.findings), (1, 1));
         assert_eq!(kinds(&flown.wishes), "charge lost");
         assert_eq!(told(&flown.wishes), ["10 s after the first decision the pack loses 90 battery units"]);
     }
@@ -256,6 +256,6 @@ mod tests {
         let flown = flown(0.0);
         assert_eq!(faults(&flown), [""; 0]);
         let row = Row::of(&flown, false);
-        assert_eq!((row.landed, row.taken_over, row.elsewhere, row.stuck, row.violated), (1, 0, 0, 0, 0));
+        assert_eq!((row.landed, row.taken_over, row.elsewhere, row.stuck, row.findings), (1, 0, 0, 0, 0));
     }
 }
