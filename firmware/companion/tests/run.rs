@@ -289,7 +289,7 @@ fn fill(pipe: &std::io::PipeReader) {
     let mut options = std::fs::OpenOptions::new();
     options.write(true).custom_flags(nonblocking);
     let mut pipe = options.open(format!("/proc/self/fd/{}", pipe.as_raw_fd())).unwrap();
-    while pipe.write(&[b'.']).is_ok() {}
+    while pipe.write(b".").is_ok() {}
 }
 
 #[test]
