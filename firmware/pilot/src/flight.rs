@@ -16,6 +16,8 @@ const UNREADY: Duration = Duration::from_secs(2);
 const ATTEMPTS: u8 = 3;
 /// Pause before the autopilot is asked again to take the aircraft back.
 const ASK_AGAIN: Duration = Duration::from_secs(2);
+/// And once that has failed some times.
+const ASK_SELDOM: Duration = Duration::from_secs(10);
 /// Legs in a row without progress after which there is nothing left to try.
 const STALLS: u8 = 2;
 
@@ -160,7 +162,7 @@ impl Machine {
     ) -> Phase {
         let position = match flight.judge(now, late, inputs) {
             Ok(position) => position,
-            Err(upset) => return give_up(now, upset, inputs, out),
+            Err(upset) => return give_up(now, &flight, upset, inputs, out),
         };
         flight.keep_speed(inputs, out);
         if inputs.vehicle.failsafe {
@@ -192,7 +194,7 @@ impl Machine {
     ) -> Phase {
         let position = match flight.judge(now, late, inputs) {
             Ok(position) => position,
-            Err(upset) => return give_up(now, upset, inputs, out),
+            Err(upset) => return give_up(now, &flight, upset, inputs, out),
         };
         if flight.landing.is_some() {
             return landing(now, flight, reason, inputs, out);
@@ -203,14 +205,16 @@ impl Machine {
             Progress::Arrived if self.is_terminal(&flight) => land(flight, reason, out),
             Progress::Arrived => {
                 let decision = self.deliberation(now, State::Homing, &flight, inputs).homeward();
-                let Some(decision) = decision else { return fault(now, Fault::NoWayHome, inputs, out) };
+                let Some(decision) = decision else {
+                    return fault(now, &flight, Fault::NoWayHome, inputs, out);
+                };
                 self.follow(now, &mut flight, decision, inputs, out);
                 Phase::Homing(flight, reason)
             }
             Progress::Stalled => {
                 flight.stalls += 1;
                 if flight.stalls >= STALLS {
-                    return fault(now, Fault::NoProgress, inputs, out);
+                    return fault(now, &flight, Fault::NoProgress, inputs, out);
                 }
                 out.say(Severity::Warning, format_args!("gleaner: {}", ReturnReason::NoProgress.text()));
                 Phase::Homing(flight, reason)
@@ -306,7 +310,7 @@ fn landing(
     if answer(false) {
         let attempts = flight.landing.unwrap_or(0);
         if attempts >= ATTEMPTS {
-            return fault(now, Fault::LandingRefused, inputs, out);
+            return fault(now, &flight, Fault::LandingRefused, inputs, out);
         }
         flight.landing = Some(attempts + 1);
         out.command = Some(AutopilotCommand::Land);
@@ -314,38 +318,59 @@ fn landing(
     Phase::Homing(flight, reason)
 }
 
-fn give_up(now: Instant, upset: Upset, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+fn give_up(now: Instant, flight: &Flight, upset: Upset, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
     match upset {
         Upset::Taken => Phase::Passive,
         Upset::Landing => Phase::Done { landed: !inputs.vehicle.armed },
         Upset::Disarmed => Phase::Idle,
-        Upset::Fault(kind) => fault(now, kind, inputs, out),
+        Upset::Fault(kind) => fault(now, flight, kind, inputs, out),
     }
 }
 
-fn fault(now: Instant, fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
-    HandBack { ask_at: Some(now), waiting: false, failures: 0 }.step(now, fault, inputs, out)
+fn fault(now: Instant, flight: &Flight, fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) -> Phase {
+    let cell_m = flight.plan.frame.grid().cell().0;
+    let left = Left { at: flight.leg.target, within_m: 1.5 * cell_m, unheard: false };
+    HandBack { left: Some(left), ask_at: now, waiting: false, failures: 0 }.step(now, fault, inputs, out)
 }
 
 /// After a fault in flight: the aircraft is given back to the autopilot by a request to return to launch.
 ///
 /// ArduCopter never forgets a position target: without this it would hover until its battery is empty. So the request
 /// is repeated until it is accepted, however long the line is bad. PX4 returns by itself one second after the targets
-/// stop. The request goes out only while heartbeats still show that the aircraft is ours (armed, GUIDED or OFFBOARD);
-/// any other mode ends it for good, since then someone else has the aircraft. It is the same safe way out for all
-/// faults: the estimator's failsafe overrides it where a position is needed and missing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// stop. The request goes out only while heartbeats show that the aircraft is ours (armed, GUIDED or OFFBOARD); any
+/// other mode ends it for good, since then someone else has the aircraft. Who was not heard for a while may have changed
+/// hands and be in GUIDED again: then it is ours only where we left it. It is the same safe way out for all faults: the
+/// estimator's failsafe overrides it where a position is needed and missing.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HandBack {
-    /// When it may be asked again; `None` once there is nothing to give back.
-    ask_at: Option<Instant>,
+    /// `None` once there is nothing to give back.
+    left: Option<Left>,
+    /// When it may be asked again.
+    ask_at: Instant,
     waiting: bool,
-    failures: u8,
+    failures: u16,
+}
+
+/// Where the aircraft was left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Left {
+    /// The last target.
+    at: Ned,
+    /// So far from it, it may still be on its way.
+    within_m: f32,
+    /// Whether the autopilot fell silent since.
+    unheard: bool,
 }
 
 impl HandBack {
     /// There is nothing to give back.
     pub(crate) const fn nothing() -> HandBack {
-        HandBack { ask_at: None, waiting: false, failures: 0 }
+        HandBack { left: None, ask_at: Instant::ZERO, waiting: false, failures: 0 }
+    }
+
+    /// Whether the aircraft still has to be given back.
+    pub(crate) const fn is_pending(&self) -> bool {
+        self.left.is_some()
     }
 
     pub(crate) fn step(
@@ -364,7 +389,19 @@ impl HandBack {
             out.withdraw |= self.waiting;
             self = HandBack::nothing();
         }
-        if vehicle.is_guided() && !self.waiting && self.ask_at.is_some_and(|at| now >= at) {
+        let Some(left) = &mut self.left else { return Phase::Fault(fault, self) };
+        left.unheard |= vehicle.mode.is_none();
+        let is_ours = match vehicle.position.filter(|_| left.unheard) {
+            None => !left.unheard,
+            Some(position) if position.horizontal_distance(&left.at).0 <= left.within_m => true,
+            Some(_) if !vehicle.is_guided() => false,
+            Some(_) => {
+                out.say(Severity::Critical, format_args!("gleaner: moved by another, left to you"));
+                out.withdraw |= self.waiting;
+                return Phase::Fault(fault, HandBack::nothing());
+            }
+        };
+        if vehicle.is_guided() && is_ours && !self.waiting && now >= self.ask_at {
             self.waiting = true;
             out.command = Some(AutopilotCommand::ReturnToLaunch);
         }
@@ -373,13 +410,14 @@ impl HandBack {
 
     /// Refused, or three times not answered.
     fn failed(self, now: Instant, out: &mut Outputs) -> HandBack {
-        if self.ask_at.is_none() {
+        if self.left.is_none() {
             return self;
         }
-        let failures = self.failures.saturating_add(1);
-        if failures == ATTEMPTS {
+        let failures = self.failures.wrapping_add(1);
+        if failures.is_multiple_of(u16::from(ATTEMPTS)) {
             out.say(Severity::Critical, format_args!("gleaner: autopilot does not return, take over"));
         }
-        HandBack { ask_at: Some(now + ASK_AGAIN), waiting: false, failures }
+        let pause = if failures < u16::from(ATTEMPTS) { ASK_AGAIN } else { ASK_SELDOM };
+        HandBack { ask_at: now + pause, waiting: false, failures, ..self }
     }
 }

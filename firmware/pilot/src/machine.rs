@@ -254,6 +254,10 @@ impl Machine {
                 out.say(Severity::Warning, format_args!("gleaner: off in flight, take over now"));
                 Phase::Idle
             }
+            (Request::Off, Phase::Fault(_, hand_back)) if hand_back.is_pending() => {
+                out.say(Severity::Warning, format_args!("gleaner: off in flight, take over now"));
+                Phase::Idle
+            }
             (Request::Off, _) => Phase::Idle,
             (Request::Engage, flying @ (Phase::Engaged(_) | Phase::Homing(..))) => flying,
             (Request::Engage, _) => Phase::Waiting(Wait::new(inputs.vehicle)),

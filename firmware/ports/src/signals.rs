@@ -9,14 +9,15 @@ use std::sync::atomic::AtomicBool;
 /// A flag that is raised when the operating system asks this program to end: SIGINT, SIGTERM, or SIGHUP, which comes
 /// when the terminal is closed.
 ///
-/// A hangup that was ignored when the program was started stays ignored: that is what `nohup` is for.
+/// What was ignored when the program was started stays ignored: hangups under `nohup`, interrupts of a script's
+/// background.
 ///
 /// # Errors
 /// The system refuses a handler.
 pub fn asked_to_end() -> io::Result<Arc<AtomicBool>> {
     let asked = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP] {
-        if signal != SIGHUP || !is_ignored(signal) {
+        if !is_ignored(signal) {
             flag::register(signal, Arc::clone(&asked))?;
         }
     }

@@ -67,6 +67,8 @@ pub enum Breach {
     TargetsAfterTakeOver,
     /// The pilot has asked for a mode in which it steers.
     AskedForMode,
+    /// The pilot on board decided for the aircraft, or sent it home, after somebody else had taken it.
+    TookItBack,
     /// A target was not a number.
     NotANumber,
 }
@@ -94,6 +96,7 @@ impl fmt::Display for Breach {
             Breach::LandedElsewhere { cell: None } => write!(f, "landed outside the map"),
             Breach::TargetsAfterTakeOver => write!(f, "sent targets after the aircraft was taken over"),
             Breach::AskedForMode => write!(f, "asked the autopilot for GUIDED by itself"),
+            Breach::TookItBack => write!(f, "took the aircraft back from somebody else"),
             Breach::NotANumber => write!(f, "sent a target that is not a number"),
         }
     }
@@ -115,6 +118,9 @@ pub struct Referee {
     expected: Option<u32>,
     /// Whether the pilot's decisions are being flown now.
     flying: bool,
+    /// Whether somebody else took the aircraft since it was engaged, and whether it is in their mode now.
+    taken: bool,
+    theirs: bool,
     /// Whether the autopilot flies home or lands.
     leaving: bool,
     ignored_targets: u32,
@@ -157,6 +163,8 @@ impl Referee {
             decisions: 0,
             expected: None,
             flying: false,
+            taken: false,
+            theirs: false,
             leaving: false,
             ignored_targets: 0,
             other_mode_since: None,
@@ -174,6 +182,16 @@ impl Referee {
         let _ = self.guard.set_reserve(self.parameters.reserve());
     }
 
+    /// The operator asked for the pilot on board: it may have the aircraft.
+    pub fn hear_engage_request(&mut self) {
+        self.taken = false;
+    }
+
+    fn took_it_back(&mut self, now: Instant) {
+        self.taken = false;
+        self.violated(now, Breach::TookItBack);
+    }
+
     /// The pilot asked the autopilot for a mode.
     pub fn hear_mode_request(&mut self, now: Instant) {
         self.violated(now, Breach::AskedForMode);
@@ -187,6 +205,9 @@ impl Referee {
         self.expected = Some(record.sequence.wrapping_add(1));
         if !matches!(record.state, State::Engaged | State::Homing) {
             return false;
+        }
+        if self.taken {
+            self.took_it_back(now);
         }
         self.flying = true;
         self.decisions += 1;
@@ -260,8 +281,15 @@ impl Referee {
         let lands = truth.mode == CopterMode::Land && truth.mode_is_companions;
         if truth.mode != CopterMode::Guided && !lands {
             // Somebody else has it: where it lands is theirs.
-            self.flying &= truth.mode == CopterMode::Rtl;
+            self.flying &= truth.mode == CopterMode::Rtl && truth.mode_is_companions;
         }
+        // Given back in GUIDED, it may be sent home: whether somebody had it meanwhile, a dead line does not tell.
+        let theirs = truth.mode != CopterMode::Guided && !truth.mode_is_companions && self.decisions > 0;
+        if self.theirs && truth.mode != CopterMode::Guided && truth.mode_is_companions {
+            self.took_it_back(now);
+        }
+        self.theirs = theirs && truth.speaks;
+        self.taken |= self.theirs;
         let ignored = truth.ignored_targets > self.ignored_targets;
         self.ignored_targets = truth.ignored_targets;
         let taken = self.other_mode_since.is_some_and(|since| now - since > self.take_over_grace);

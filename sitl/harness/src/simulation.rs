@@ -14,7 +14,15 @@ use gleaner_radio::Report;
 use gleaner_units::{Duration, Instant, Ned};
 use gleaner_world::Field;
 use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_VALUE_DATA};
+use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_SET_DATA, PARAM_VALUE_DATA};
+
+/// Whether an operator asks the pilot on board to engage, by command or by parameter.
+fn asks_to_engage(frame: &Frame) -> bool {
+    let command = parse::<COMMAND_LONG_DATA>(frame);
+    let parameter = parse::<PARAM_SET_DATA>(frame);
+    command.is_some_and(|c| c.command == MavCmd::MAV_CMD_USER_2 && c.param1 == 1.0)
+        || parameter.is_some_and(|p| p.param_id.to_str() == Ok("GLN_ENABLE") && p.param_value == 1.0)
+}
 
 /// The world around one pilot.
 #[derive(Debug)]
@@ -100,6 +108,9 @@ impl Simulation {
             bytes = &bytes[taken..];
             while let Some(frame) = self.ground_tap.next_frame() {
                 self.journal.frame(now, relayed(&frame));
+                if asks_to_engage(&frame) {
+                    self.referee.hear_engage_request();
+                }
             }
         }
         self.copter.receive(LinkId::GROUND, all);

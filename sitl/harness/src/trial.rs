@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn a_calm_trial_is_the_same_mission_without_incidents() {
+    fn a_calm_trial_has_the_same_place_and_devices_and_no_incidents() {
         for number in 0..50 {
             let (calm, other) = (Trial::draw(number, true), Trial::draw(number, false));
             assert_eq!(calm.wishes.incidents, []);

@@ -1,12 +1,12 @@
 //! Whole missions through real MAVLink bytes, flown by simple policies.
 
 use gleaner_harness::{
-    CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Staged, Switch, WireFault, Wishes, fly,
-    trajectory,
+    Breach, CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Referee, Staged, Switch, Truth,
+    WireFault, Wishes, fly, trajectory,
 };
 use gleaner_pilot::State;
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
-use gleaner_units::{Action, BatteryUnits, Duration};
+use gleaner_units::{Action, BatteryUnits, Duration, Instant};
 use gleaner_world::{Episode, ScenarioKind, World};
 use std::sync::Arc;
 
@@ -212,6 +212,58 @@ fn an_estimator_that_fails_for_a_moment_is_waited_for_and_the_autopilots_landing
         let state = if is_good { State::Done } else { State::Passive };
         assert_eq!(flown.state, Some(state), "{:?}", texts(&flown));
     }
+}
+
+#[test]
+fn a_pilot_who_flew_while_the_line_was_cut_keeps_the_aircraft() {
+    let at = |seconds, kind| Incident { after: Duration::from_secs(seconds), kind };
+    let incidents = vec![
+        at(20, IncidentKind::Wire(WireFault::LineCut, Duration::from_secs(25))),
+        at(22, IncidentKind::PilotSelects(CopterMode::Rtl)),
+        at(36, IncidentKind::PilotSelects(CopterMode::Guided)),
+        at(80, IncidentKind::PilotSelects(CopterMode::Loiter)),
+    ];
+    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(0.0) }, Homeward);
+    assert_eq!(flown.figures().violations, [], "{:?}", texts(&flown));
+    assert_eq!((flown.ending, flown.state), (Ending::TakenOver, Some(State::Fault)), "{:?}", texts(&flown));
+    assert!(texts(&flown).iter().any(|text| text.contains("moved by another")), "{:?}", texts(&flown));
+}
+
+#[test]
+fn the_referee_sees_a_pilot_that_takes_the_aircraft_back() {
+    let flown = flown(rd(4), Wishes::plain(0.0), Homeward);
+    let staged = flown.simulation.staged();
+    let record = &flown.simulation.journal().slots()[0].record;
+    let guided = Truth {
+        mode: CopterMode::Guided,
+        mode_is_companions: false,
+        armed: true,
+        on_ground: false,
+        ..flown.simulation.truth()
+    };
+    let loiter = Truth { mode: CopterMode::Loiter, ..guided };
+    let returns = Truth { mode: CopterMode::Rtl, mode_is_companions: true, ..guided };
+    let now = Instant::from_millis(60_000);
+    let judge = |acts: &dyn Fn(&mut Referee)| {
+        let guard = staged.mission.guard(staged.plan.reserve).unwrap();
+        let mut referee = Referee::new(staged, guard);
+        referee.hear_decision(now, record, &guided);
+        acts(&mut referee);
+        referee.violations().iter().any(|violation| violation.breach == Breach::TookItBack)
+    };
+    let watch =
+        |referee: &mut Referee, truths: &[Truth]| truths.iter().for_each(|truth| referee.watch(now, truth));
+    assert!(!judge(&|referee| watch(referee, &[guided, returns])), "after a fault it may");
+    assert!(judge(&|referee| watch(referee, &[guided, loiter, returns])));
+    assert!(judge(&|referee| {
+        watch(referee, &[loiter, guided]);
+        referee.hear_decision(now, record, &guided);
+    }));
+    assert!(!judge(&|referee| {
+        watch(referee, &[loiter, guided]);
+        referee.hear_engage_request();
+        referee.hear_decision(now, record, &guided);
+    }));
 }
 
 #[test]

@@ -49,7 +49,7 @@ fn a_sweep_finds_nothing_and_says_the_same_twice() {
         serde_json::from_slice(&output.stdout).unwrap()
     };
     let report = sweep(&[]);
-    assert_eq!(report, sweep(&[]), "the same on any number of cores");
+    assert_eq!(report, sweep(&[]), "whichever core flies which");
     assert_eq!(report["findings"], serde_json::json!([]));
     let sum = |report: &serde_json::Value, key: &str| -> u64 {
         report["rows"].as_object().unwrap().values().map(|row| row[key].as_u64().unwrap()).sum()

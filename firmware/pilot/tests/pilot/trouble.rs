@@ -98,8 +98,9 @@ fn a_return_that_is_not_accepted_is_asked_for_until_it_is_or_someone_takes_over(
         rig.vehicle.position = None;
         rig.run(60.0);
         let asked = rig.commanded(AutopilotCommand::ReturnToLaunch);
-        assert!((29..=31).contains(&asked), "every two seconds: {asked}");
-        assert_eq!(rig.said("autopilot does not return, take over"), 1);
+        // At 0, 2 and 4 s, then every 10 s.
+        assert!((8..=9).contains(&asked), "{asked}");
+        assert_eq!(rig.said("autopilot does not return, take over"), 2);
         if accepted {
             rig.accepts = Some(true);
         } else {
@@ -107,8 +108,38 @@ fn a_return_that_is_not_accepted_is_asked_for_until_it_is_or_someone_takes_over(
         }
         rig.run(60.0);
         let more = rig.commanded(AutopilotCommand::ReturnToLaunch) - asked;
-        assert!(more <= usize::from(accepted), "{more}");
+        assert_eq!(more, usize::from(accepted));
     }
+}
+
+#[test]
+fn who_moved_the_aircraft_while_it_was_unheard_keeps_it() {
+    for moved_m in [0.0, 100.0] {
+        let mut rig = Rig::engaged();
+        rig.run(1.0);
+        rig.obeys = false;
+        rig.vehicle.mode = None;
+        rig.run(20.0);
+        let position = rig.vehicle.position.as_mut().unwrap();
+        position.north_m += moved_m;
+        rig.vehicle.mode = Some(FlightMode::Guided);
+        rig.run(20.0);
+        let is_ours = moved_m == 0.0;
+        assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), usize::from(is_ours), "{moved_m}");
+        assert_eq!(rig.said("moved by another"), usize::from(!is_ours));
+    }
+}
+
+#[test]
+fn off_before_the_aircraft_is_given_back_says_that_nobody_has_it() {
+    let mut rig = Rig::engaged();
+    rig.run(1.0);
+    rig.accepts = Some(false);
+    rig.vehicle.position = None;
+    rig.run(5.0);
+    rig.request = Some(Request::Off);
+    rig.step();
+    assert_eq!((rig.state(), rig.said("off in flight, take over now")), (State::Idle, 1));
 }
 
 #[test]

@@ -39,7 +39,7 @@ struct SweepArguments {
     /// Number of the first flight; the others follow.
     #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
     first: u64,
-    /// The same missions, and nothing goes wrong.
+    /// Missions in which nothing goes wrong, without the reserve for it.
     #[arg(long)]
     calm: bool,
     /// The model [default: models/gleaner.onnx].
@@ -158,6 +158,16 @@ pub(crate) enum Task {
     Fly(FlyOrder),
     Serve(ServeOrder),
     Sweep(SweepOrder),
+}
+
+impl SweepOrder {
+    /// The flags that make a flight the same again.
+    pub fn same(&self) -> String {
+        let calm = if self.calm { " --calm" } else { "" };
+        let model = self.model.as_ref().map_or(String::new(), |path| format!(" --model {}", path.display()));
+        let engine = if self.engine == EngineKind::Native { "" } else { " --engine tract" };
+        format!("{calm}{model}{engine}")
+    }
 }
 
 /// Many missions in virtual time.

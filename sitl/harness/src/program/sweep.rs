@@ -205,7 +205,10 @@ impl Report {
             );
         }
         for Finding { flight, incidents, what } in &self.findings {
-            println!("\nflight {flight} (again: gleaner-sitl sweep --first {flight} --flights 1)");
+            println!(
+                "\nflight {flight} (again: gleaner-sitl sweep --first {flight} --flights 1{})",
+                order.same()
+            );
             incidents.iter().chain(what).for_each(|line| println!("  {line}"));
         }
         if !self.findings.is_empty() {
