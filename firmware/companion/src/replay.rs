@@ -13,7 +13,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::process::ExitCode;
 
-/// Differences that are shown one by one; the others are counted.
+/// Of each kind so many lines are shown one by one; the others are counted.
 const SHOWN: u64 = 10;
 
 /// Prints what is decided otherwise, and how far logits are apart.
@@ -36,7 +36,7 @@ pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
             }),
         }
     }
-    let Findings { counts, furthest, .. } = again.findings;
+    let Findings { counts, furthest } = again.findings;
     let [alike, differing, guards, skipped] = counts;
     if alike + differing + guards == 0 {
         return Err(StartError::NoDecisions { path: order.log.clone() });
@@ -46,7 +46,8 @@ pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
     println!("by the guard, no model   {guards}");
     println!("lines skipped            {skipped}");
     println!("logits apart by at most  {furthest:.1e}");
-    Ok(if differing == 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    // Nothing compared is no success.
+    Ok(if differing == 0 && alike > 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
 /// What is read of a line; [`crate::log`] writes more.
@@ -90,17 +91,15 @@ struct Findings {
     /// By [`Kind`].
     counts: [u64; 4],
     furthest: f32,
-    shown: u64,
 }
 
 impl Findings {
     fn note(&mut self, kind: Kind, text: impl FnOnce() -> String) {
         self.counts[kind as usize] += 1;
         if matches!(kind, Kind::Differing | Kind::Skipped) {
-            self.shown += 1;
-            match self.shown {
+            match self.counts[kind as usize] {
                 ..=SHOWN => println!("{}", text()),
-                _ if self.shown == SHOWN + 1 => println!("and more, counted below"),
+                count if count == SHOWN + 1 => println!("and more of these, counted below"),
                 _ => {}
             }
         }

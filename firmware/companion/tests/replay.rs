@@ -66,6 +66,14 @@ fn the_guard_that_flew_is_the_guard_of_the_replay() {
 }
 
 #[test]
+fn a_log_of_the_guards_decisions_alone_proves_nothing() {
+    let mut guards = line(0);
+    guards["logits"] = Value::Null;
+    let (code, stdout, _) = replay(&guards.to_string());
+    assert_eq!((code, counts(&stdout)), (Some(1), vec!["0", "0", "1", "0", "0.0e0"]), "{stdout}");
+}
+
+#[test]
 fn half_a_line_is_skipped_and_said() {
     let whole = line(0).to_string();
     let (code, stdout, _) = replay(&format!("{}\n{whole}\n", &whole[..100]));

@@ -98,7 +98,9 @@ fn fly_all(order: &SweepOrder, brain: &Brain) -> Result<Vec<Judged>, ProgramErro
             if index >= order.flights {
                 return Ok(flown);
             }
-            let judged = fly(order, &world, order.first + index, &mut policy, brain)?;
+            let judged = fly(order, &world, order.first + index, &mut policy, brain)
+                // The others need not go on for nothing.
+                .inspect_err(|_| done.store(order.flights, Ordering::Relaxed))?;
             if let Some(finding) = &judged.finding {
                 bar.set_message(format!("(last finding: flight {})", finding.flight));
             }
