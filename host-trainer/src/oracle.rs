@@ -42,17 +42,16 @@ const fn is_none(count: &u32) -> bool {
 impl OracleSetting {
     /// The same of the first `count` realizations; `None` if there are not so many.
     #[must_use]
-    pub fn first(mut self, count: u64) -> Option<OracleSetting> {
+    pub fn first(&self, count: u64) -> Option<OracleSetting> {
         let len = usize::try_from(count).ok()?;
-        let is_enough = self.missions.0.iter().all(|missions| missions.len() >= len);
-        self.missions.0.iter_mut().for_each(|missions| missions.truncate(len));
-        // The mean over fewer missions is another one.
-        if self.upper_bound_percent.len() < len {
-            self.upper_bound_percent.clear();
-        }
-        self.upper_bound_percent.truncate(len);
-        self.realizations = count;
-        is_enough.then_some(self)
+        let missions: Option<_> = self.missions.0.iter().map(|all| Some(all.get(..len)?.to_vec())).collect();
+        Some(OracleSetting {
+            realizations: count,
+            missions: Missions(missions?),
+            // The mean over fewer missions is another one.
+            upper_bound_percent: self.upper_bound_percent.get(..len).unwrap_or_default().to_vec(),
+            ..self.clone()
+        })
     }
 }
 

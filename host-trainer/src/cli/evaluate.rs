@@ -1,6 +1,6 @@
 //! `gleaner-train evaluate`.
 
-use super::oracle::{bar, plan, prove};
+use super::oracle::{bar, known, plan, prove, read_or_shipped};
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::evaluation::{
     Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
@@ -126,7 +126,7 @@ fn limits(arguments: &Arguments, places: &[Place]) -> Result<Limits> {
         }
         let setting =
             Setting { kind: arguments.scenario, devices: arguments.devices, battery: arguments.battery };
-        let known = super::oracle::known(None, setting, arguments.realizations)?;
+        let known = known(&read_or_shipped(None)?, setting, arguments.realizations);
         return Ok(known.map_or_else(Limits::default, |known| Limits {
             data_percent: known.limits(setting).map(|limits| limits.data_percent),
             oracle: Some(known.missions.table()),

@@ -143,6 +143,7 @@ fn card_text(
          | hypervolume | GREEDY | oracle |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     let mut details = String::new();
+    let lines = oracle::read_or_shipped(arguments.oracle.as_deref())?;
     for asked in Setting::ALL {
         let Setting { kind, devices, .. } = asked;
         let drawn = realizations(world, &asked.scenario(), arguments.realizations)?;
@@ -152,7 +153,7 @@ fn card_text(
             6 => evaluate(world, &drawn, &mut Engine(policy))?,
             _ => evaluate(world, &drawn, &mut Network::new(Shape::actor(), &learned.actor))?,
         };
-        let limit = oracle::known(arguments.oracle.as_deref(), asked, arguments.realizations)?;
+        let limit = oracle::known(&lines, asked, arguments.realizations);
         writeln!(summary, "{}", summary_row(asked, &table, &greedy, limit.as_ref()))?;
         if devices == 6 {
             writeln!(details, "\n## {kind}, K = 6, B = 80\n\n{}", render(&table))?;

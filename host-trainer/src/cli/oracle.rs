@@ -127,15 +127,10 @@ pub(super) fn read_or_shipped(named: Option<&Path>) -> Result<Vec<OracleSetting>
     named.or_else(|| shipped.exists().then_some(shipped)).map_or_else(|| Ok(Vec::new()), read)
 }
 
-/// One setting's first `realizations` in the named file, or in the shipped one if it is there.
-pub(super) fn known(
-    named: Option<&Path>,
-    setting: Setting,
-    realizations: u64,
-) -> Result<Option<OracleSetting>> {
+/// One setting's first `realizations`, if the lines have them.
+pub(super) fn known(lines: &[OracleSetting], setting: Setting, realizations: u64) -> Option<OracleSetting> {
     // A later line of the file replaces an earlier one.
-    let lines = read_or_shipped(named)?.into_iter().rev().filter(|line| line.is_of(setting));
-    Ok(lines.filter_map(|line| line.first(realizations)).next())
+    lines.iter().rev().filter(|line| line.is_of(setting)).find_map(|line| line.first(realizations))
 }
 
 /// The settings in a file that this command wrote.

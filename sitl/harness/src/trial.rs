@@ -95,8 +95,8 @@ fn happens(rng: &mut impl Rng) -> Vec<Incident> {
         3 => IncidentKind::LosesBattery(BatteryUnits(f32::from(rng.random_range(1..=20_u8)))),
         4 => IncidentKind::AutopilotReboots,
         5 => IncidentKind::EstimatorFails(Duration::from_millis(rng.random_range(200..=10_000))),
-        8 => fails(WireFault::RadioSilent, rng),
         6 => fails(WireFault::LineCut, rng),
+        8 => fails(WireFault::RadioSilent, rng),
         _ => {
             let one_in = [30, 100, 1000][rng.random_range(0..3)];
             fails(WireFault::LineNoise(one_in), rng)
