@@ -17,6 +17,8 @@ use thiserror::Error;
 
 /// The best parameters' name inside the output folder.
 pub const LEARNED: &str = "learned.checkpoint";
+/// The folder inside the output folder that holds the parameters as they stand, where the output folder has the best.
+pub const LAST: &str = "last";
 
 /// The best parameters of a run by validation, and how they came about: what `evaluate` and `export` read.
 ///
@@ -128,6 +130,16 @@ impl Learned {
     /// The disk; the last good file is then still there.
     pub fn save(&self, folder: &Path) -> Result<(), CheckpointError> {
         checkpoint::save_named(&folder.join(LEARNED), self.system.name(), self)
+    }
+
+    /// Writes it into a folder that may not exist yet.
+    ///
+    /// # Errors
+    /// The disk; the last good file is then still there.
+    pub fn save_in(&self, folder: &Path) -> Result<(), CheckpointError> {
+        std::fs::create_dir_all(folder)
+            .map_err(|source| CheckpointError::Io { path: folder.to_path_buf(), source })?;
+        self.save(folder)
     }
 
     /// What flies it in an evaluation, in batches, in any city.

@@ -57,6 +57,8 @@ struct Rates {
     learning_rate: f32,
     /// Target entropy as a share of the largest possible.
     entropy_target: f32,
+    /// Temperature of the policy's softmax inside targets, losses and entropy.
+    heat: f32,
 }
 
 /// A transition under a preference.
@@ -98,6 +100,7 @@ impl<E: Encoding> learner::Learner for Learner<E> {
         let rates = Rates {
             learning_rate: settings.learning_rate_at(update),
             entropy_target: settings.entropy_target_at(update),
+            heat: if settings.heat_in_policy { settings.heat_at(update) } else { 1.0 },
         };
         let copies = settings.preferences;
         debug_assert_eq!(preferences.len(), transitions.len() * copies);
@@ -107,7 +110,7 @@ impl<E: Encoding> learner::Learner for Learner<E> {
             .map(|(index, &preference)| (transitions[index / copies], preference))
             .collect();
         self.scratch.pack(encoding, transitions, preferences);
-        let targets = self.targets(settings, &samples);
+        let targets = self.targets(settings, &samples, rates);
         let (critic, values) = self.update_critics(&samples, &targets, rates);
         let (actor, entropy) = self.update_actor(&samples, &values, rates);
         for (target, critic) in self.targets.iter_mut().zip(&self.critics) {
@@ -122,8 +125,7 @@ impl<E: Encoding> learner::Learner for Learner<E> {
 
     /// The heated softmax (paper, eq. 20).
     fn explore(settings: &Settings, update: u64, logits: &[f32; ACTIONS], mask: ActionMask) -> Distribution {
-        let heat = settings.heat_at(update);
-        Distribution::new(&logits.map(|logit| logit / heat), mask)
+        Distribution::heated(logits, settings.heat_at(update), mask)
     }
 }
 
@@ -141,7 +143,12 @@ impl<E: Encoding> Learner<E> {
     }
 
     /// y = r + gamma E_a' [min(T1, T2) - nu log pi], per objective (paper, eq. 17 with twin critics).
-    fn targets(&mut self, settings: &Settings, samples: &[Sample<'_, E>]) -> Vec<[f32; OBJECTIVES]> {
+    fn targets(
+        &mut self,
+        settings: &Settings,
+        samples: &[Sample<'_, E>],
+        rates: Rates,
+    ) -> Vec<[f32; OBJECTIVES]> {
         let nu = self.entropy_weight();
         let Scratch { after, workspace, .. } = &mut self.scratch;
         let logits: Vec<[f32; ACTIONS]> =
@@ -155,7 +162,7 @@ impl<E: Encoding> Learner<E> {
             .map(|(index, (transition, _))| {
                 let mut target = seen_reward::<E>(settings, transition);
                 if !transition.over {
-                    let policy = Distribution::new(&logits[index], transition.mask_after);
+                    let policy = Distribution::heated(&logits[index], rates.heat, transition.mask_after);
                     for (objective, target) in target.iter_mut().enumerate() {
                         let value = policy.expectation(|action| {
                             let at = action * OBJECTIVES + objective;
@@ -236,14 +243,17 @@ impl<E: Encoding> Learner<E> {
                     .zip(range)
                 {
                     let mask = samples[index].0.mask_before;
-                    let policy = Distribution::new(logits, mask);
+                    let policy = Distribution::heated(logits, rates.heat, mask);
                     let cost = |action: usize| nu * policy.log_probability[action] - values[index][action];
                     let mean = policy.expectation(cost);
-                    // d/dl_a sum_b pi_b f_b = pi_a (f_a - mean); the derivative of log pi cancels.
+                    // d/dl_a sum_b pi_b f_b = pi_a (f_a - mean) / heat; the derivative of log pi cancels.
                     for (action, gradient) in gradients.iter_mut().enumerate() {
                         let probability = policy.probability[action];
-                        *gradient =
-                            if probability > 0.0 { scale * probability * (cost(action) - mean) } else { 0.0 };
+                        *gradient = if probability > 0.0 {
+                            scale * probability * (cost(action) - mean) / rates.heat
+                        } else {
+                            0.0
+                        };
                     }
                     let own = -policy.expectation(|action| policy.log_probability[action]);
                     loss += scale * mean;
@@ -282,6 +292,12 @@ impl Distribution {
             distribution.probability[action] = distribution.log_probability[action].exp();
         }
         distribution
+    }
+
+    /// The softmax of the allowed logits at this temperature (paper, eq. 20).
+    #[must_use]
+    pub fn heated(logits: &[f32; ACTIONS], heat: f32, mask: ActionMask) -> Distribution {
+        Distribution::new(&logits.map(|logit| logit / heat), mask)
     }
 
     /// The best of the allowed actions, but a random one of them in a share `epsilon` of all cases.

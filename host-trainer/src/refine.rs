@@ -36,7 +36,7 @@ use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
 use crate::planner::{Prospect, THRIFT};
 use crate::settings::Settings;
 use crate::system::System;
-use crate::train::{Learned, Tables, TrainError, Validation};
+use crate::train::{LAST, Learned, Tables, TrainError, Validation};
 use crate::variety::{Setting, Variety};
 use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
@@ -51,8 +51,6 @@ use std::sync::Arc;
 
 /// The checkpoint's name inside the output folder.
 pub const CHECKPOINT: &str = "refine.checkpoint";
-/// The folder inside the output folder that holds the policy as it stands, where the output folder has its best.
-pub const LAST: &str = "last";
 /// Missions in the air at once, and slots that each flies between two updates.
 const FLIGHTS: u64 = 128;
 const SLOTS: usize = 32;
@@ -446,10 +444,7 @@ impl Learning for Refinement {
         };
         self.kept.flights = self.flights.iter().map(begun).collect();
         checkpoint::save(&folder.join(CHECKPOINT), &self.kept)?;
-        let last = folder.join(LAST);
-        std::fs::create_dir_all(&last)
-            .map_err(|source| CheckpointError::Io { path: last.clone(), source })?;
-        self.last().save(&last)
+        self.last().save_in(&folder.join(LAST))
     }
 }
 

@@ -57,12 +57,22 @@ pub struct Settings {
     /// Temperature of the exploring softmax at the end (paper: 1.5).
     #[arg(long, default_value_t = 1.5)]
     pub heat_end: f32,
-    /// Updates over which target entropy and heat move from start to end (paper: 100,000 steps).
+    /// Environment steps after the warm-up over which target entropy and heat move from start to end (paper: 100,000
+    /// steps). An update flies `steps_per_update` of them.
     #[arg(long, default_value_t = 100_000)]
     pub anneal: u64,
-    /// Weight of the entropy, nu, before it is learned; in scaled rewards.
-    #[arg(long, default_value_t = 0.05)]
+    /// Initial entropy coefficient nu, in scaled rewards. Adam moves ln nu by at most the learning rate an update, so
+    /// a start at 0.05 needs 25,000 updates to come down to where it settles.
+    #[arg(long, default_value_t = 0.005)]
     pub entropy_weight: f32,
+    /// Use the heated softmax (paper, eq. 20) as the policy everywhere: in exploration, targets, actor loss and
+    /// entropy. Without it the heat is applied in exploration only.
+    #[arg(long, default_value_t = false, default_missing_value = "true", num_args = 0..=1)]
+    pub heat_in_policy: bool,
+    /// Validate on the 100 evaluation realizations, as the paper's learning curves do. Only the final parameters of
+    /// such a run are a fair result: the best by validation were chosen on the realizations that judge them.
+    #[arg(long, default_value_t = false, default_missing_value = "true", num_args = 0..=1)]
+    pub validate_on_evaluation: bool,
     /// The networks see rewards times this, so that values lie within a few units of zero.
     #[arg(long, default_value_t = 0.05)]
     pub reward_scale: f32,
@@ -190,7 +200,12 @@ impl Settings {
             let value =
                 value.as_f64().map_or_else(|| value.to_string(), |number| format!("{}", number as f32));
             let default = argument.get_default_values().first().and_then(|value| value.to_str());
-            if default.unwrap_or("").parse::<f32>().ok() != value.parse::<f32>().ok() {
+            let default = default.unwrap_or("");
+            let is_default = match (default.parse::<f32>(), value.parse::<f32>()) {
+                (Ok(default), Ok(value)) => default == value,
+                _ => default == value,
+            };
+            if !is_default {
                 command += &format!(" --{flag} {value}");
             }
         }
@@ -212,7 +227,8 @@ impl Settings {
     /// How far along the annealing is, 0 to 1.
     #[must_use]
     pub fn annealed(&self, update: u64) -> f32 {
-        (update as f64 / self.anneal.max(1) as f64).min(1.0) as f32
+        let steps = update as f64 * self.steps_per_update as f64;
+        (steps / self.anneal.max(1) as f64).min(1.0) as f32
     }
 
     /// Adam's step size at this update.
@@ -245,4 +261,27 @@ pub struct Mission {
     pub preference: Preference,
     /// Who flies it, if not the policy.
     pub guide: Option<Greedy>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn annealing_counts_environment_steps() {
+        let settings = Settings { steps_per_update: 4, anneal: 100_000, ..Settings::default() };
+        assert_eq!(settings.annealed(0), 0.0);
+        assert_eq!(settings.annealed(12_500), 0.5);
+        assert_eq!(settings.annealed(25_000), 1.0);
+        assert_eq!(settings.heat_at(25_000), settings.heat_end);
+    }
+
+    #[test]
+    fn command_line_names_switches_that_are_on() {
+        let settings = Settings { heat_in_policy: true, ..Settings::default() };
+        assert_eq!(
+            settings.command_line("train", "runs/x"),
+            "gleaner-train train --out runs/x --heat-in-policy true"
+        );
+    }
 }

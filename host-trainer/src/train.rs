@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
 
-pub use crate::learned::{LEARNED, Learned};
+pub use crate::learned::{LAST, LEARNED, Learned};
 pub use crate::validation::{Tables, Validation};
 
 /// The checkpoint's name inside the output folder.
@@ -199,6 +199,19 @@ impl<L: Learner> Run<L> {
         Ok(Going { mission: number, actions: Vec::new(), flight, guide: mission.guide })
     }
 
+    /// The averaged network as it stands.
+    fn last(&self) -> Learned {
+        Learned {
+            system: L::SYSTEM,
+            method: method(L::SYSTEM),
+            settings: self.settings.clone(),
+            actor: self.averaged.clone(),
+            update: self.update,
+            steps: self.steps,
+            score: f64::NEG_INFINITY,
+        }
+    }
+
     fn next_flight(&mut self) -> Result<Going, ScenarioError> {
         let mission = self.next_mission;
         self.next_mission += 1;
@@ -287,19 +300,11 @@ impl<L: Learner> Learning for Run<L> {
 
     fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
         let tables = self.validation.tables(&self.world, &mut Trained::<L>::new(&self.averaged))?;
-        Learned {
-            system: L::SYSTEM,
-            method: method(L::SYSTEM),
-            settings: self.settings.clone(),
-            actor: self.averaged.clone(),
-            update: self.update,
-            steps: self.steps,
-            score: tables.score(),
-        }
-        .offer(best);
+        Learned { score: tables.score(), ..self.last() }.offer(best);
         Ok(tables)
     }
 
+    /// Writes the averaged network as it stands to [`LAST`], too.
     fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
         let stored = Stored {
             settings: &self.settings,
@@ -313,7 +318,8 @@ impl<L: Learner> Learning for Run<L> {
             steps: self.steps,
             averaged: self.averaged.clone(),
         };
-        checkpoint::save_named(&folder.join(CHECKPOINT), L::SYSTEM.name(), &stored)
+        checkpoint::save_named(&folder.join(CHECKPOINT), L::SYSTEM.name(), &stored)?;
+        self.last().save_in(&folder.join(LAST))
     }
 }
 

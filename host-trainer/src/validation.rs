@@ -11,6 +11,8 @@ use std::sync::Arc;
 /// Realizations that choose the best parameters have numbers from here on; those that judge count from 0.
 const VALIDATION_FROM: u64 = 10_000;
 const VALIDATION_COUNT: u64 = 60;
+/// The evaluation realizations (paper, section V-A: 100 fixed ones).
+const EVALUATION_COUNT: u64 = 100;
 /// What a wasted battery unit costs, in hypervolume.
 const WASTE_PRICE: f64 = 100.0;
 
@@ -54,7 +56,11 @@ impl Validation {
         let trained = ScenarioKind::ALL.into_iter().zip(shares).filter(|(_, share)| *share > 0.0);
         trained
             .map(|(kind, _)| {
-                let numbers = VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT;
+                let numbers = if settings.validate_on_evaluation {
+                    0..EVALUATION_COUNT
+                } else {
+                    VALIDATION_FROM..VALIDATION_FROM + VALIDATION_COUNT
+                };
                 let drawn = numbers.map(|number| {
                     let seed = Seed::evaluation(number);
                     Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))

@@ -1,10 +1,11 @@
 //! Refinement learns from its own flights, and a kill costs it nothing but the time since the last checkpoint.
 
 use clap::Parser;
+use gleaner_host_trainer::learned::LAST;
 use gleaner_host_trainer::learned::Learned;
 use gleaner_host_trainer::learning::Learning;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::refine::{LAST, Refinement};
+use gleaner_host_trainer::refine::Refinement;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::system::System;
 use gleaner_host_trainer::variety::Variety;
