@@ -36,28 +36,22 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
-mod decision;
-mod deliberation;
-mod engagement;
+mod decide;
 mod exchange;
 mod flight;
-mod ledger;
-mod leg;
 mod machine;
 mod mission;
-#[cfg(feature = "std")]
-pub mod mission_file;
-pub mod mission_image;
 mod onboard;
-mod rc;
-mod standby;
 mod state;
-mod stream;
+mod states;
 mod vehicle;
 
-pub use decision::{Decision, DecisionRecord, RECORD_BYTES_MAX};
+pub use decide::{Decision, DecisionRecord, RECORD_BYTES_MAX};
 pub use exchange::{Inputs, Notice, Outputs, Request, Telemetry};
 pub use machine::Machine;
+#[cfg(feature = "std")]
+pub use mission::file as mission_file;
+pub use mission::image as mission_image;
 pub use mission::{DeviceSite, MAX_DEVICES, Mission, MissionError};
 pub use onboard::{Onboard, OnboardError, Settings, Stats};
 pub use state::{Fault, Missing, ReturnReason, State};

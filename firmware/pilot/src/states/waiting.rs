@@ -1,10 +1,10 @@
 //! Waiting and shadow: the two states that look and do not fly.
 
-use crate::deliberation::{Deliberation, ask};
-use crate::engagement::{self, cell_under, usable_battery};
-use crate::flight::{Flight, slot};
+use crate::decide::decider::{Deliberation, ask};
+use crate::flight::plan::{self, cell_under, usable_battery};
+use crate::flight::stream::Stream;
 use crate::machine::{Phase, preference};
-use crate::stream::Stream;
+use crate::states::flying::{Flight, slot};
 use crate::{Inputs, Machine, Missing, Outputs, State, Vehicle};
 use gleaner_link::{Firmware, FlightMode, Severity};
 use gleaner_policy::Policy;
@@ -77,7 +77,7 @@ impl Machine {
             return Phase::Idle;
         }
         wait.was_armed |= vehicle.armed;
-        match engagement::check(&self.mission, &self.guard, inputs) {
+        match plan::check(&self.mission, &self.guard, inputs) {
             Ok(plan) => Phase::Engaged(Flight::new(now, plan, wait.stream)),
             Err(missing) => {
                 wait.missing = Some(missing);

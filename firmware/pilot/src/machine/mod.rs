@@ -1,7 +1,7 @@
 //! `poll(now, inputs) -> outputs`: the operator's word, the dispatch by state, and what is told of it.
 
-use crate::flight::{Flight, HandBack};
-use crate::standby::{ShadowWatch, Wait};
+use crate::states::flying::{Flight, HandBack};
+use crate::states::waiting::{ShadowWatch, Wait};
 use crate::{
     Decision, Fault, Inputs, Mission, MissionError, Outputs, Request, ReturnReason, State, Telemetry, Vehicle,
 };

@@ -1,6 +1,8 @@
 //! Bytes in, bytes out: link endpoint, radio decoder, device table and [`Machine`] in one.
 
-use crate::rc::Knob;
+mod rc;
+
+use self::rc::Knob;
 use crate::{
     Decision, Fault, Inputs, MAX_DEVICES, Machine, Missing, Mission, MissionError, Outputs, RECORD_BYTES_MAX,
     Request, ReturnReason, State, Vehicle,

@@ -1,5 +1,9 @@
 //! The mission: everything that is fixed before take-off.
 
+#[cfg(feature = "std")]
+pub mod file;
+pub mod image;
+
 use core::fmt;
 use gleaner_guard::{Guard, GuardError};
 use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap};

@@ -1,6 +1,6 @@
 //! Everything that must hold before the mission is engaged.
 
-use crate::ledger::{Ledger, charge, smaller};
+use crate::flight::ledger::{Ledger, charge, smaller};
 use crate::{Inputs, Missing, Mission, Vehicle};
 use gleaner_guard::Guard;
 use gleaner_units::{BatteryUnits, Cell, GridFrame, Ned};

@@ -1,10 +1,10 @@
 //! Engaged and homing: the two states that move the aircraft, and how they give it back.
 
-use crate::deliberation::{Deliberation, ask};
-use crate::engagement::Plan;
-use crate::leg::{Leg, Progress, Purpose};
+use crate::decide::decider::{Deliberation, ask};
+use crate::flight::leg::{Leg, Progress, Purpose};
+use crate::flight::plan::Plan;
+use crate::flight::stream::Stream;
 use crate::machine::{Phase, preference};
-use crate::stream::Stream;
 use crate::{Decision, Fault, Inputs, Machine, Outputs, ReturnReason, State};
 use gleaner_link::{AutopilotCommand, Firmware, Parameters, Severity};
 use gleaner_policy::Policy;
