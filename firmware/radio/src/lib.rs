@@ -5,7 +5,7 @@
 //! device is served, and what its SNR means, is decided elsewhere.
 //!
 //! # Glossary
-//! - **device**: one sensor on the ground, named by a 16-bit id that the mission lists.
+//! - **device**: one sensor on the ground, named by a 32-bit id that the mission lists.
 //! - **report**: what the modem measured of one device at one time ([`Report`]).
 //! - **age**: how long before its arrival a report was measured, plus how long ago it arrived.
 //! - **remaining**: data units that the device still holds, if it tells.
@@ -16,7 +16,7 @@
 //!
 //! | part | what it is |
 //! |---|---|
-//! | `body` | postcard: device (varint u16), SNR in dB (f32, little endian), remaining (0, or 1 and an f32), age in ms (varint u32) |
+//! | `body` | postcard: device (varint u32), SNR in dB (f32, little endian), remaining (0, or 1 and an f32), age in ms (varint u32) |
 //! | `crc` | CRC-16/IBM-SDLC of the body, low byte first (check value of "123456789": 0x906E) |
 //!
 //! Device 300 at 2.5 dB with 1000 units remaining, measured 250 ms ago:

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// The device's id.
-    pub device: u16,
+    pub device: u32,
     /// Signal to noise ratio of the device's transmission.
     pub snr: Db,
     /// Data units that the device still holds, if it tells.
@@ -31,8 +31,8 @@ pub enum ReportFault {
     Value,
 }
 
-/// Longest body: 3 + 4 + 5 + 5.
-pub const BODY_BYTES: usize = 17;
+/// Longest body: 5 + 4 + 5 + 5.
+pub const BODY_BYTES: usize = 19;
 const CRC_BYTES: usize = 2;
 /// Body and checksum, one byte of COBS overhead.
 pub(crate) const STUFFED_BYTES: usize = BODY_BYTES + CRC_BYTES + 1;
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn the_longest_report_fits() {
-        let longest = Report { device: u16::MAX, snr: Db(-1.1), remaining: Some(1.1), age_ms: u32::MAX };
+        let longest = Report { device: u32::MAX, snr: Db(-1.1), remaining: Some(1.1), age_ms: u32::MAX };
         assert_eq!(encode_body(&longest).len(), BODY_BYTES);
         assert_eq!(decode_body(&encode_body(&longest)), Ok(longest));
         assert_eq!(encode(&longest).len(), STUFFED_BYTES + 2);

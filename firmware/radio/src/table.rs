@@ -10,7 +10,7 @@ pub enum TableError {
     /// More devices than places.
     TooMany,
     /// An id is listed twice.
-    Twice(u16),
+    Twice(u32),
 }
 
 /// What a report did.
@@ -40,7 +40,7 @@ impl Heard {
 
 #[derive(Clone, Copy, Debug)]
 struct Device {
-    id: u16,
+    id: u32,
     heard: Option<Heard>,
     remaining: Option<f32>,
 }
@@ -58,7 +58,7 @@ impl<const N: usize> DeviceTable<N> {
     ///
     /// # Errors
     /// See [`TableError`].
-    pub fn new(ids: &[u16]) -> Result<DeviceTable<N>, TableError> {
+    pub fn new(ids: &[u32]) -> Result<DeviceTable<N>, TableError> {
         let mut table = DeviceTable::empty();
         for &id in ids {
             table.add(id)?;
@@ -76,7 +76,7 @@ impl<const N: usize> DeviceTable<N> {
     ///
     /// # Errors
     /// See [`TableError`]; nothing changes.
-    pub fn add(&mut self, id: u16) -> Result<(), TableError> {
+    pub fn add(&mut self, id: u32) -> Result<(), TableError> {
         if self.index_of(id).is_some() {
             return Err(TableError::Twice(id));
         }
@@ -118,13 +118,13 @@ impl<const N: usize> DeviceTable<N> {
 
     /// The place of a device in the mission's order.
     #[must_use]
-    pub fn index_of(&self, id: u16) -> Option<usize> {
+    pub fn index_of(&self, id: u32) -> Option<usize> {
         self.devices.iter().position(|device| device.id == id)
     }
 
     /// The id of the device at a place.
     #[must_use]
-    pub fn id(&self, index: usize) -> Option<u16> {
+    pub fn id(&self, index: usize) -> Option<u32> {
         self.devices.get(index).map(|device| device.id)
     }
 
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn report(device: u16, snr: f32, remaining: Option<f32>, age_ms: u32) -> Report {
+    fn report(device: u32, snr: f32, remaining: Option<f32>, age_ms: u32) -> Report {
         Report { device, snr: Db(snr), remaining, age_ms }
     }
 
@@ -207,7 +207,7 @@ mod tests {
 
         #[test]
         fn no_flood_leaves_an_odd_value(
-            reports in proptest::collection::vec((0u16..6, any::<f32>(), any::<Option<f32>>(), any::<u32>(), 0u64..5_000), 0..400)
+            reports in proptest::collection::vec((0u32..6, any::<f32>(), any::<Option<f32>>(), any::<u32>(), 0u64..5_000), 0..400)
         ) {
             let mut table = DeviceTable::<4>::new(&[0, 1, 2, 3]).unwrap();
             let mut now_ms = 0;

@@ -32,8 +32,8 @@ pub struct Modem {
 
 /// The id in the reports of the device with this index.
 #[must_use]
-pub fn device_id(index: usize) -> u16 {
-    index as u16 + 1
+pub fn device_id(index: usize) -> u32 {
+    index as u32 + 1
 }
 
 impl Modem {

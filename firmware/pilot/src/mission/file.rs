@@ -15,7 +15,7 @@
 //! excluded = [[12, 7]]            # cells taken out
 //!
 //! [[device]]
-//! id = 1                          # as in its radio reports
+//! id = 1                          # as in its radio reports; or dev_addr = "26011BDA", or dev_eui (its low 8 digits)
 //! cell = [11, 4]                  # or lat_deg and lon_deg
 //! data = 6000.0                   # data units at the start
 //! ```
@@ -99,11 +99,43 @@ struct FenceTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct DeviceTable {
-    id: u16,
+    id: Option<DeviceId>,
+    dev_addr: Option<String>,
+    dev_eui: Option<String>,
     cell: Option<[i16; 2]>,
     lat_deg: Option<f64>,
     lon_deg: Option<f64>,
     data: f32,
+}
+
+/// A number, or eight hexadecimal digits.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum DeviceId {
+    Number(u32),
+    Text(String),
+}
+
+/// Exactly this many hexadecimal digits.
+fn hexadecimal(text: &str, digits: usize) -> Option<u64> {
+    let is_hexadecimal = text.len() == digits && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    u64::from_str_radix(text, 16).ok().filter(|_| is_hexadecimal)
+}
+
+impl DeviceTable {
+    /// The id in the device's radio reports: `id`, the LoRaWAN device address, or the low half of the device EUI.
+    fn number(&self) -> Result<u32, &'static str> {
+        match (&self.id, &self.dev_addr, &self.dev_eui) {
+            (Some(DeviceId::Number(id)), None, None) => Ok(*id),
+            (Some(DeviceId::Text(text)), None, None) | (None, Some(text), None) => hexadecimal(text, 8)
+                .map(|address| address as u32)
+                .ok_or("a device address has 8 hexadecimal digits, such as \"26011BDA\""),
+            (None, None, Some(text)) => hexadecimal(text, 16)
+                .map(|eui| eui as u32)
+                .ok_or("dev_eui has 16 hexadecimal digits, such as \"70B3D57ED0001BDA\""),
+            _ => Err("a device has either id, dev_addr or dev_eui: give one of them"),
+        }
+    }
 }
 
 /// Reads a mission file. `city` gives the text of the city file for the path in `heights`, which is relative to
@@ -155,6 +187,13 @@ impl Reader<'_> {
         };
         for entry in &file.devices {
             let site = self.site(&mission, entry)?;
+            if let Some(first) = mission.devices.iter().position(|other| other.id == site.id) {
+                let first = file.devices.get(first).map_or(0, |first| self.line(first));
+                return Err(self.fault(
+                    entry,
+                    format!("device {} is already in line {first}: correct one of the ids", site.id),
+                ));
+            }
             mission.devices.push(site).map_err(|_| {
                 self.fault(entry, format!("more than {} devices: take some out", crate::MAX_DEVICES))
             })?;
@@ -232,7 +271,8 @@ impl Reader<'_> {
     }
 
     fn site(&self, mission: &Mission, entry: &Spanned<DeviceTable>) -> Result<DeviceSite, MissionFileError> {
-        let &DeviceTable { id, cell: at, lat_deg, lon_deg, data } = entry.get_ref();
+        let id = entry.get_ref().number().map_err(|what| self.fault(entry, what))?;
+        let &DeviceTable { cell: at, lat_deg, lon_deg, data, .. } = entry.get_ref();
         let at = match (at, lat_deg, lon_deg) {
             (Some(at), None, None) => cell(at),
             (None, Some(lat_deg), Some(lon_deg)) => {
@@ -297,7 +337,7 @@ struct FenceOut {
 
 #[derive(Serialize)]
 struct DeviceOut {
-    id: u16,
+    id: u32,
     cell: [i16; 2],
     data: f32,
 }

@@ -8,7 +8,7 @@
 //! | 2 | version, [`VERSION`] |
 //! | 2 | length of the body |
 //! | 4 | CRC-32 (ISO-HDLC) of the body |
-//! | body | grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (2 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
+//! | body | grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (4 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
 //!
 //! Whatever follows the body is ignored, so the image may stand in a longer section of flash.
 
@@ -18,11 +18,11 @@ use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap, MAX_
 use heapless::Vec;
 
 /// The layout above.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 const MAGIC: [u8; 4] = *b"GLNM";
 const HEADER_BYTES: usize = 12;
 const FIXED_BYTES: usize = 26;
-const DEVICE_BYTES: usize = 10;
+const DEVICE_BYTES: usize = 12;
 /// The longest image.
 pub const IMAGE_BYTES_MAX: usize =
     HEADER_BYTES + FIXED_BYTES + MAX_DEVICES * DEVICE_BYTES + MAX_CELLS + MAX_CELLS / 8;
@@ -175,7 +175,8 @@ impl<'b> Reader<'b> {
             devices: Vec::new(),
         };
         for _ in 0..self.u16()? {
-            let site = DeviceSite { id: self.u16()?, cell: self.cell()?, data: self.f32()? };
+            let site =
+                DeviceSite { id: u32::from_le_bytes(self.array()?), cell: self.cell()?, data: self.f32()? };
             mission.devices.push(site).map_err(|_| ImageError::Value)?;
         }
         for (cell, &height_m) in grid.cells().zip(self.slice(grid.len())?) {
@@ -206,7 +207,11 @@ mod tests {
                 fence.remove(cell);
             }
         }
-        let site = |id| DeviceSite { id, cell: Cell::new((id % width) as i16, 0), data: f32::from(id) };
+        let site = |id: u16| DeviceSite {
+            id: u32::from(id) + 0x2601_0000,
+            cell: Cell::new((id % width) as i16, 0),
+            data: f32::from(id),
+        };
         Mission {
             heights,
             fence,

@@ -17,7 +17,7 @@ pub const MAX_DEVICES: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeviceSite {
     /// The number that its radio reports carry.
-    pub id: u16,
+    pub id: u32,
     /// Where it stands.
     pub cell: Cell,
     /// Data that it holds at the start, data units.
@@ -55,17 +55,17 @@ pub enum MissionError {
     /// This device stands outside the city.
     DeviceOutside {
         /// Its id.
-        id: u16,
+        id: u32,
     },
     /// Two devices have this id.
     DuplicateDevice {
         /// The id.
-        id: u16,
+        id: u32,
     },
     /// This device's data is negative or not a number.
     DeviceData {
         /// Its id.
-        id: u16,
+        id: u32,
     },
 }
 

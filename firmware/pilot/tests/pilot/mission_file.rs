@@ -56,7 +56,7 @@ fn a_mission_survives_writing_and_reading() {
 fn faults_name_the_line_and_say_what_to_do() {
     assert_eq!(
         fails(&TEXT.replace("id = 9", "id = 7")),
-        "line 18: two devices have the id 7: correct this device"
+        "line 18: device 7 is already in line 13: correct one of the ids"
     );
     assert_eq!(
         fails(&TEXT.replace("cell = [1, 1]", "cell = [9, 1]")),
@@ -86,6 +86,24 @@ fn faults_name_the_line_and_say_what_to_do() {
     assert!(fails(&TEXT.replace("cell_m", "cell_metres")).starts_with("line 7: unknown field `cell_metres`"));
     assert!(fails("terminal = [1").starts_with("line 1: "));
     assert!(fails(&TEXT.replace("data = 6000.0\n", "")).starts_with("line 13: missing field `data`"));
+}
+
+#[test]
+fn devices_are_named_by_32_bit_ids_and_lorawan_addresses() {
+    for name in
+        ["id = 0x26011BDA", "id = \"26011BDA\"", "dev_addr = \"26011bda\"", "dev_eui = \"70B3D57E26011BDA\""]
+    {
+        let mission = read(&TEXT.replace("id = 9", name), city).unwrap();
+        assert_eq!(mission.devices[1].id, 0x2601_1BDA, "{name}");
+    }
+    assert_eq!(
+        fails(&TEXT.replace("id = 9", "dev_addr = \"2601\"")),
+        "line 18: a device address has 8 hexadecimal digits, such as \"26011BDA\""
+    );
+    assert_eq!(
+        fails(&TEXT.replace("id = 9", "id = 9\ndev_addr = \"26011BDA\"")),
+        "line 18: a device has either id, dev_addr or dev_eui: give one of them"
+    );
 }
 
 #[test]
