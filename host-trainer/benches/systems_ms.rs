@@ -5,10 +5,10 @@
 mod processor;
 
 use clap::Parser;
-use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
-use gleaner_host_trainer::learning::Learning;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::train::Run;
+use gleaner_host_trainer::learn::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learn::learning::Learning;
+use gleaner_host_trainer::learn::run::Run;
+use gleaner_host_trainer::learn::settings::Settings;
 use processor::cpu_ms;
 use std::path::Path;
 

@@ -11,47 +11,23 @@
 //! - **realization**: devices drawn for a scenario; evaluation realizations are never trained on.
 //!
 //! # How it hangs together
-//! `train` reads top to bottom; what it calls lives beside it: [`flight`] and [`encoding`] make samples,
-//! [`replay`] keeps them, [`mosac`] or [`ddqn`] learns from them (what the loop asks of either is [`learner`]),
-//! [`validation`] and [`evaluation`] judge, [`checkpoint`] survives a kill, [`learned`] is what is left, [`export`]
-//! writes the model. The networks themselves are [`net`]; [`system`] lists what can be trained.
+//! `train` reads top to bottom; what it calls lives beside it: [`env::flight`] and [`observe::encoding`] make samples,
+//! [`learn::replay`] keeps them, [`learn::mosac`] or [`learn::ddqn`] learns from them (what the loop asks of either is [`learn::learner`]),
+//! [`judge::validation`] and [`judge::evaluation`] judge, [`keep::checkpoint`] survives a kill, [`keep::snapshot`] is what is left, [`export`]
+//! writes the model. The networks themselves are [`net`]; [`systems`] lists what can be trained.
 //!
-//! The policies that fly come another way: [`distil`] copies the [`teacher`], who knows what the aircraft cannot see,
-//! and [`refine`] lets the pupil learn from its own flights. What one loop asks of all three ways is [`learning`]. What
-//! they are measured against is the [`oracle`]: the best tour that the [`planner`] finds for someone who knows
+//! The policies that fly come another way: [`learn::distil`] copies the [`planner::teacher`], who knows what the aircraft cannot see,
+//! and [`learn::ppo`] lets the pupil learn from its own flights. What one loop asks of all three ways is [`learn::learning`]. What
+//! they are measured against is the [`planner::oracle`]: the best tour that the [`planner`] finds for someone who knows
 //! everything, and a proven bound on what anyone can have.
 
-pub mod checkpoint;
-pub mod curves;
-pub mod ddqn;
-pub mod distil;
-pub mod encoding;
-pub mod evaluation;
-pub mod explanation;
+pub mod env;
 pub mod export;
-pub mod flight;
-pub mod greedy;
-pub mod learned;
-pub mod learner;
-pub mod learning;
-pub mod maps;
-pub mod mosac;
+pub mod judge;
+pub mod keep;
+pub mod learn;
 pub mod net;
-pub mod observation;
-pub mod oracle;
-pub mod paper;
-pub mod paper_tokens;
-pub mod pareto;
-pub mod parts;
+pub mod observe;
 pub mod planner;
-pub mod refine;
-pub mod replay;
 pub mod report;
-pub mod robustness;
-pub mod settings;
-pub mod system;
-pub mod teacher;
-pub mod train;
-pub mod validation;
-pub mod variety;
-pub mod whole;
+pub mod systems;

@@ -1,6 +1,6 @@
 //! GREEDY against the calibration of the world: means over 100 realizations at w = (1, 0), within 5 points.
 
-use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations};
+use gleaner_host_trainer::judge::evaluation::{evaluate_greedy, realizations};
 use gleaner_units::BatteryUnits;
 use gleaner_world::{ScenarioKind, World};
 use std::sync::Arc;

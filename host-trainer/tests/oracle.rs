@@ -1,7 +1,7 @@
 //! The oracle plans what can be flown, and better than anyone who knows less.
 
-use gleaner_host_trainer::evaluation::{evaluate_greedy, realizations, test_preferences};
-use gleaner_host_trainer::oracle::{OracleSetting, Thoroughness, consult};
+use gleaner_host_trainer::judge::evaluation::{evaluate_greedy, realizations, test_preferences};
+use gleaner_host_trainer::planner::oracle::{OracleSetting, Thoroughness, consult};
 use gleaner_host_trainer::planner::{Effort, Problem, Rates, State, Tour};
 use gleaner_units::{Action, BatteryUnits};
 use gleaner_world::{Realization, ScenarioKind, Seed, World};

@@ -1,14 +1,14 @@
 //! Refinement learns from its own flights, and a kill costs it nothing but the time since the last checkpoint.
 
 use clap::Parser;
-use gleaner_host_trainer::learned::LAST;
-use gleaner_host_trainer::learned::Learned;
-use gleaner_host_trainer::learning::Learning;
+use gleaner_host_trainer::env::variety::Variety;
+use gleaner_host_trainer::keep::snapshot::LAST;
+use gleaner_host_trainer::keep::snapshot::Learned;
+use gleaner_host_trainer::learn::learning::Learning;
+use gleaner_host_trainer::learn::ppo::Refinement;
+use gleaner_host_trainer::learn::settings::Settings;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::refine::Refinement;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::variety::Variety;
+use gleaner_host_trainer::systems::System;
 use gleaner_units::Action;
 use gleaner_world::World;
 use rand::SeedableRng;
@@ -108,7 +108,7 @@ fn other_cities_are_drawn_as_often_as_asked_and_always_the_same() {
 
 #[test]
 fn a_missing_report_leaves_the_device_unheard_and_its_data_as_last_told() {
-    use gleaner_host_trainer::flight::Flight;
+    use gleaner_host_trainer::env::flight::Flight;
     use gleaner_policy::Preference;
     use gleaner_world::{Realization, ScenarioKind, Seed};
     let world = Arc::new(World::default_world());

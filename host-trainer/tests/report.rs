@@ -1,10 +1,10 @@
 //! The report as a program: one page that needs nothing else, CSV files, parts that are kept, and bad input refused.
 
 use clap::Parser;
+use gleaner_host_trainer::learn::run::{CURVE, Learned};
+use gleaner_host_trainer::learn::settings::Settings;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::train::{CURVE, Learned};
+use gleaner_host_trainer::systems::System;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::fs;

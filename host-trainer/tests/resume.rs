@@ -1,11 +1,11 @@
 //! A killed run goes on exactly where its last checkpoint was.
 
 use clap::Parser;
-use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
-use gleaner_host_trainer::learning::Learning;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::train::{CHECKPOINT, Run, TrainError};
+use gleaner_host_trainer::learn::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learn::learning::Learning;
+use gleaner_host_trainer::learn::run::{CHECKPOINT, Run, TrainError};
+use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::systems::System;
 use std::fs;
 
 #[derive(Parser)]

@@ -1,15 +1,15 @@
 //! The teacher is a teacher worth having, and a pupil of it survives a kill.
 
 use clap::Parser;
-use gleaner_host_trainer::distil::Distillation;
-use gleaner_host_trainer::evaluation::{Network, evaluate_greedy, realizations};
-use gleaner_host_trainer::flight::Flight;
-use gleaner_host_trainer::learned::Learned;
-use gleaner_host_trainer::learning::Learning;
+use gleaner_host_trainer::env::flight::Flight;
+use gleaner_host_trainer::judge::evaluation::{Network, evaluate_greedy, realizations};
+use gleaner_host_trainer::keep::snapshot::Learned;
+use gleaner_host_trainer::learn::distil::Distillation;
+use gleaner_host_trainer::learn::learning::Learning;
+use gleaner_host_trainer::learn::settings::Settings;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::teacher::Teacher;
+use gleaner_host_trainer::planner::teacher::Teacher;
+use gleaner_host_trainer::systems::System;
 use gleaner_policy::Preference;
 use gleaner_units::Action;
 use gleaner_world::{ScenarioKind, World};

@@ -1,9 +1,9 @@
 //! Observations for engines to answer.
 
-use gleaner_host_trainer::evaluation::{Network, realizations, test_preferences};
-use gleaner_host_trainer::flight::Flight;
+use gleaner_host_trainer::env::flight::Flight;
+use gleaner_host_trainer::judge::evaluation::{Network, realizations, test_preferences};
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::observation::normalise;
+use gleaner_host_trainer::observe::tokens::normalise;
 use gleaner_policy::schema::TERMINAL_UNITS;
 use gleaner_policy::{K_MAX, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE, Tokens};
 use gleaner_units::ActionMask;

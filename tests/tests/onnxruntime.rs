@@ -3,7 +3,7 @@
 
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs, read_actor};
 use gleaner_host_trainer::net::{Batch, Shape, Workspace, forward};
-use gleaner_host_trainer::observation::normalise;
+use gleaner_host_trainer::observe::tokens::normalise;
 use gleaner_policy::onnx::{INPUTS, TractPolicy};
 use gleaner_policy::{Attention, Inference, K_MAX, Policy, Tokens};
 use gleaner_tests::observations::random;

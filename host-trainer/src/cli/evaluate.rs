@@ -2,13 +2,13 @@
 
 use super::oracle::{bar, known, plan, prove, read_or_shipped};
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{
+use gleaner_host_trainer::judge::evaluation::{
     Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
 };
-use gleaner_host_trainer::oracle::Thoroughness;
-use gleaner_host_trainer::paper::Setting;
+use gleaner_host_trainer::judge::paper::Setting;
+use gleaner_host_trainer::learn::run::Learned;
+use gleaner_host_trainer::planner::oracle::Thoroughness;
 use gleaner_host_trainer::planner::{DEVICES_MAX, Rates};
-use gleaner_host_trainer::train::Learned;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{Channel, City, Realization, ScenarioKind, Seed, World};
 use std::path::{Path, PathBuf};

@@ -3,15 +3,17 @@
 use super::evaluate::render;
 use super::{learned_of, oracle, write_whole};
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{Engine, Network, Table, evaluate, evaluate_greedy, realizations};
+use gleaner_host_trainer::env::flight::Flight;
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
-use gleaner_host_trainer::flight::Flight;
+use gleaner_host_trainer::judge::evaluation::{
+    Engine, Network, Table, evaluate, evaluate_greedy, realizations,
+};
+use gleaner_host_trainer::judge::paper::Setting;
+use gleaner_host_trainer::learn::run::Learned;
+use gleaner_host_trainer::learn::settings::Settings;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::oracle::OracleSetting;
-use gleaner_host_trainer::paper::Setting;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::train::Learned;
+use gleaner_host_trainer::planner::oracle::OracleSetting;
+use gleaner_host_trainer::systems::System;
 use gleaner_policy::Tokens;
 use gleaner_policy::onnx::TractPolicy;
 use gleaner_world::{ScenarioKind, World};
@@ -91,7 +93,7 @@ fn golden_observations(world: &Arc<World>) -> Result<Vec<Tokens>> {
         for (preference, slots) in [(1.0, 0), (0.5, 20), (0.0, 1)] {
             let preference = gleaner_policy::Preference::new(preference).context("a preference")?;
             let mut flight = Flight::new(world, &drawn[0].1, drawn[0].0, preference)?;
-            let mut greedy = gleaner_host_trainer::greedy::Greedy::new(devices);
+            let mut greedy = gleaner_host_trainer::env::greedy::Greedy::new(devices);
             for _ in 0..slots {
                 flight.step(greedy.decide(&flight));
             }

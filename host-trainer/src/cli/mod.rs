@@ -9,9 +9,9 @@ mod train;
 
 use anyhow::{Context, Result};
 use clap::{Parser, Subcommand};
-use gleaner_host_trainer::learned::Learned;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::whole;
+use gleaner_host_trainer::keep::snapshot::Learned;
+use gleaner_host_trainer::keep::whole;
+use gleaner_host_trainer::systems::System;
 use std::path::Path;
 
 /// Learns, evaluates and exports policies for Gleaner.

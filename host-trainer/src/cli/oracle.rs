@@ -2,10 +2,10 @@
 
 use super::write_whole;
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{Missions, realizations, test_preferences};
-use gleaner_host_trainer::flight::Reward;
-use gleaner_host_trainer::oracle::{OracleSetting, Thoroughness, consult};
-use gleaner_host_trainer::paper::Setting;
+use gleaner_host_trainer::env::flight::Reward;
+use gleaner_host_trainer::judge::evaluation::{Missions, realizations, test_preferences};
+use gleaner_host_trainer::judge::paper::Setting;
+use gleaner_host_trainer::planner::oracle::{OracleSetting, Thoroughness, consult};
 use gleaner_host_trainer::planner::{Rates, upper_bound_percent};
 use gleaner_world::{Realization, Seed, World};
 use indicatif::{ProgressBar, ProgressStyle};

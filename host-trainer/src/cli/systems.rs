@@ -3,11 +3,11 @@
 use super::evaluate::learned;
 use super::export::load_model;
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::evaluation::{self, Decider, realizations};
-use gleaner_host_trainer::flight::Flight;
-use gleaner_host_trainer::parts::fingerprint;
+use gleaner_host_trainer::env::flight::Flight;
+use gleaner_host_trainer::judge::evaluation::{self, Decider, realizations};
+use gleaner_host_trainer::keep::parts::fingerprint;
+use gleaner_host_trainer::learn::run::Learned;
 use gleaner_host_trainer::report::Latency;
-use gleaner_host_trainer::train::Learned;
 use gleaner_policy::Preference;
 use gleaner_policy::onnx::TractPolicy;
 use gleaner_world::{Scenario, World};

@@ -2,14 +2,14 @@
 
 use super::learned_of;
 use anyhow::{Context, Result, bail};
-use gleaner_host_trainer::curves::{Curves, scalars_in};
-use gleaner_host_trainer::distil::Distillation;
-use gleaner_host_trainer::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
-use gleaner_host_trainer::learning::Learning;
-use gleaner_host_trainer::refine::Refinement;
-use gleaner_host_trainer::settings::Settings;
-use gleaner_host_trainer::system::System;
-use gleaner_host_trainer::train::{Learned, Run, Tables};
+use gleaner_host_trainer::keep::curves::{Curves, scalars_in};
+use gleaner_host_trainer::learn::distil::Distillation;
+use gleaner_host_trainer::learn::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
+use gleaner_host_trainer::learn::learning::Learning;
+use gleaner_host_trainer::learn::ppo::Refinement;
+use gleaner_host_trainer::learn::run::{Learned, Run, Tables};
+use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::systems::System;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Display;
 use std::fs;

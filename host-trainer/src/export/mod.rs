@@ -12,7 +12,7 @@ mod builder;
 mod graph;
 
 use crate::net::{Batch, Shape, Workspace, forward};
-use crate::observation::normalise;
+use crate::observe::tokens::normalise;
 use gleaner_policy::onnx::{self, Metadata, ModelError, pb};
 use gleaner_policy::{Golden, Tokens};
 use gleaner_units::Action;

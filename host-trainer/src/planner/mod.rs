@@ -6,7 +6,9 @@
 
 mod bound;
 mod known;
+pub mod oracle;
 mod search;
+pub mod teacher;
 mod tour;
 
 pub use bound::upper_bound_percent;
@@ -14,7 +16,7 @@ pub use known::{Audible, Known, Rates};
 pub use search::{Effort, Problem};
 pub use tour::{DEVICES_MAX, State, Stop, Tour};
 
-use crate::flight::Flight;
+use crate::env::flight::Flight;
 use gleaner_units::{Action, Cell};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

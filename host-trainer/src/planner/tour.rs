@@ -1,7 +1,7 @@
 //! A plan, and what comes of it in the mean.
 
 use super::known::Known;
-use crate::flight::Flight;
+use crate::env::flight::Flight;
 use gleaner_units::{Action, BatteryUnits, Cell};
 use gleaner_world::Realization;
 

@@ -1,10 +1,10 @@
 //! The numbers behind the page, as CSV files.
 
 use super::Report;
-use crate::evaluation::{Missions, test_preferences};
-use crate::explanation::KINDS;
-use crate::paper::{CITATIONS, Setting};
-use crate::pareto::front;
+use crate::judge::evaluation::{Missions, test_preferences};
+use crate::judge::explanation::KINDS;
+use crate::judge::paper::{CITATIONS, Setting};
+use crate::judge::pareto::front;
 
 /// Name of the oracle in tables, legends and files.
 pub(super) const ORACLE: &str = "ORACLE";
@@ -101,7 +101,7 @@ fn fronts(report: &Report) -> String {
     let lines = flown(report).flat_map(|(about, _, missions)| {
         let rows = missions.table().rows;
         let best = front(&rows.iter().map(|row| row.point()).collect::<Vec<_>>());
-        let line = |row: crate::evaluation::Row| {
+        let line = |row: crate::judge::evaluation::Row| {
             let is_on_front = best.contains(&row.point());
             let (w, data, data_std) = (row.w_data, row.data_percent, row.data_std);
             format!("{about},{w},{data},{data_std},{},{},{is_on_front}", row.energy, row.energy_std)
@@ -202,7 +202,7 @@ fn curves(report: &Report) -> String {
 }
 
 fn published() -> String {
-    let line = |cited: &crate::paper::Citation| {
+    let line = |cited: &crate::judge::paper::Citation| {
         format!("{},{},{}", field(cited.what), field(cited.value), field(cited.place))
     };
     file("what,value,place", CITATIONS.iter().map(line))

@@ -1,6 +1,6 @@
 //! The city from above with the way of a mission over it.
 
-use crate::explanation::Track;
+use crate::judge::explanation::Track;
 use gleaner_units::HeightMap;
 use maud::{Markup, html};
 use std::collections::BTreeMap;

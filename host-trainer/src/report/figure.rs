@@ -3,10 +3,10 @@
 use super::chart::{Axis, BOUND, Joined, Look, ORACLE, PAPER, Series, Spot, heat_map, legend, look, plot};
 use super::table::Metric;
 use super::{Detail, Report, csv, drawing, table};
-use crate::evaluation::Table;
-use crate::explanation::{Gaze, KINDS, Track};
-use crate::paper::Setting;
-use crate::pareto::front as best_of;
+use crate::judge::evaluation::Table;
+use crate::judge::explanation::{Gaze, KINDS, Track};
+use crate::judge::paper::Setting;
+use crate::judge::pareto::front as best_of;
 use gleaner_world::ScenarioKind;
 use maud::{Markup, html};
 

@@ -12,13 +12,13 @@ mod table;
 pub use csv::files;
 pub use page::page;
 
-pub use crate::oracle::OracleSetting;
+pub use crate::planner::oracle::OracleSetting;
 
-use crate::curves::Point;
-use crate::evaluation::{Missions, Table};
-use crate::explanation::{Gaze, Track};
-use crate::paper::{Limits, Setting};
-use crate::robustness::Repeats;
+use crate::judge::evaluation::{Missions, Table};
+use crate::judge::explanation::{Gaze, Track};
+use crate::judge::paper::{Limits, Setting};
+use crate::judge::robustness::Repeats;
+use crate::keep::curves::Point;
 use gleaner_units::HeightMap;
 use gleaner_world::ScenarioKind;
 use serde::{Deserialize, Serialize};

@@ -2,8 +2,8 @@
 
 use super::table::{Metric, main_table, metric_table};
 use super::{Detail, Report, figure};
-use crate::explanation::KINDS;
-use crate::paper::{CITATIONS, EXAMPLES, Setting};
+use crate::judge::explanation::KINDS;
+use crate::judge::paper::{CITATIONS, EXAMPLES, Setting};
 use gleaner_world::ScenarioKind;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 

@@ -3,8 +3,8 @@
 use super::Report;
 use super::chart::grouped;
 use super::csv::ORACLE;
-use crate::evaluation::Table;
-use crate::paper::{Limits, Setting};
+use crate::judge::evaluation::Table;
+use crate::judge::paper::{Limits, Setting};
 use gleaner_world::ScenarioKind;
 use maud::{Markup, html};
 

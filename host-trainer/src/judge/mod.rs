@@ -1,0 +1,8 @@
+//! Measures systems: the metrics, settings and analyses of the paper.
+
+pub mod evaluation;
+pub mod explanation;
+pub mod paper;
+pub mod pareto;
+pub mod robustness;
+pub mod validation;
