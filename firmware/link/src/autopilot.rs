@@ -1,7 +1,7 @@
 //! What is known of the one autopilot.
 
 use crate::event::Events;
-use crate::streams::Streams;
+use crate::streams::{Streams, Wants};
 use crate::{
     Address, BatteryStatus, ChargeState, CommandResult, Event, Firmware, FlightMode, GlobalOrigin,
     GlobalPosition, Heartbeat, HomePosition, LandedState, LocalPosition, Message, Outgoing, RcChannels,
@@ -33,6 +33,7 @@ type Latest<T> = Option<(T, Instant)>;
 pub struct Autopilot {
     address: Option<Address>,
     connected: bool,
+    other_mode_seen: bool,
     heartbeat: Latest<Heartbeat>,
     known: Known,
 }
@@ -102,6 +103,25 @@ impl Autopilot {
     #[must_use]
     pub fn is_armed(&self) -> bool {
         self.heartbeat.is_some_and(|(heartbeat, _)| heartbeat.armed)
+    }
+
+    /// When its last heartbeat arrived, while connected.
+    #[must_use]
+    pub fn heartbeat_at(&self) -> Option<Instant> {
+        self.heartbeat.filter(|_| self.connected).map(|(_, at)| at)
+    }
+
+    /// When a heartbeat last showed that the aircraft is ours: armed and in a mode in which position targets are
+    /// obeyed. `None` as soon as a heartbeat shows otherwise.
+    #[must_use]
+    pub fn ours_at(&self) -> Option<Instant> {
+        self.heartbeat_at().filter(|_| self.is_armed() && self.companion_may_steer())
+    }
+
+    /// Whether a heartbeat since the last call showed a mode in which we do not steer, even if a later one does not.
+    /// A flag and not an event: a queue that is full could drop it.
+    pub(crate) fn take_other_mode(&mut self) -> bool {
+        core::mem::take(&mut self.other_mode_seen)
     }
 
     /// Its `MAV_STATE`.
@@ -237,7 +257,8 @@ impl Autopilot {
     }
 
     /// Notices the loss of the autopilot, asks for streams.
-    pub(crate) fn poll(&mut self, now: Instant, out: &mut Outgoing, events: &mut Events) {
+    /// RC channels are asked for only if `wants_rc`.
+    pub(crate) fn poll(&mut self, now: Instant, wants_rc: bool, out: &mut Outgoing, events: &mut Events) {
         let heard_at = self.heartbeat.map(|(_, at)| at);
         if self.connected && heard_at.is_none_or(|at| now.since(at) > Autopilot::LOST) {
             self.connected = false;
@@ -248,7 +269,8 @@ impl Autopilot {
             && let (Some(address), Some(firmware)) = (self.address, self.firmware())
         {
             let needs_origin = self.known.origin.is_none();
-            self.known.streams.poll(now, address, firmware, needs_origin, out);
+            let wants = Wants { origin: needs_origin, rc: wants_rc };
+            self.known.streams.poll(now, address, firmware, wants, out);
         }
     }
 
@@ -268,6 +290,7 @@ impl Autopilot {
             self.connected = true;
             events.push(Event::AutopilotConnected);
         }
+        self.other_mode_seen |= !self.companion_may_steer();
         if let Some(mode) = self.mode().filter(|mode| Some(*mode) != mode_before) {
             events.push(Event::ModeChanged(mode));
         }

@@ -1,6 +1,6 @@
 //! Commands to us: judged, run once, always answered.
 
-use crate::{Command, CommandResult, Enable};
+use crate::{Command, CommandResult, Enable, Status};
 use gleaner_units::{Duration, Instant};
 use heapless::Deque;
 use mavlink::MessageData;
@@ -35,9 +35,9 @@ pub(crate) enum Effect {
 
 /// Judges a command: the answer, and what it does when it is accepted.
 ///
-/// `may_engage` is false while the owner cannot engage (self-test failed, fault): then "engage" is
-/// temporarily rejected.
-pub(crate) fn judge(command: &Command, may_engage: bool) -> Result<Effect, CommandResult> {
+/// While the owner cannot engage (self-test failed), "engage" is temporarily rejected; while it flies nothing, "return"
+/// is denied.
+pub(crate) fn judge(command: &Command, owner: &Status) -> Result<Effect, CommandResult> {
     let [first, ..] = command.params;
     let is = |id: MavCmd| id as u32 == u32::from(command.id);
     if is(MavCmd::MAV_CMD_USER_1) {
@@ -49,12 +49,13 @@ pub(crate) fn judge(command: &Command, may_engage: bool) -> Result<Effect, Comma
     if is(MavCmd::MAV_CMD_USER_2) {
         return match Enable::from_value(first) {
             None => Err(CommandResult::Denied),
-            Some(Enable::Engage) if !may_engage => Err(CommandResult::TemporarilyRejected),
+            Some(Enable::Engage) if !owner.may_engage => Err(CommandResult::TemporarilyRejected),
             Some(enable) => Ok(Effect::Operator(OperatorRequest::Enable(enable))),
         };
     }
     if is(MavCmd::MAV_CMD_USER_3) {
-        return Ok(Effect::Operator(OperatorRequest::ReturnNow));
+        let request = Effect::Operator(OperatorRequest::ReturnNow);
+        return if owner.may_return { Ok(request) } else { Err(CommandResult::Denied) };
     }
     if is(MavCmd::MAV_CMD_REQUEST_MESSAGE) {
         return requested(first).map(Effect::Send).ok_or(CommandResult::Denied);
@@ -85,28 +86,24 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    /// A resend that says so (`confirmation` above 0) is one within this time of the last.
+    /// A resend that says so (`confirmation` above 0) arrives within this time of the first.
     const CONFIRMED: Duration = Duration::from_secs(10);
     /// The same command with nothing else from its sender in between: ground stations retry after 3 s.
     const REPEATED: Duration = Duration::from_millis(3_500);
 
     /// The answer already given if `command` is a resend.
     ///
-    /// Someone who asks for the same twice within the time, and for nothing else in between, is taken for a
-    /// resend too: that is the safe side, since nothing is done.
-    pub fn of_resend(&mut self, now: Instant, command: &Command) -> Option<CommandResult> {
-        let newest_of_sender =
-            self.recent.iter().rposition(|answered| answered.command.sender == command.sender);
-        let at = self.recent.iter().rposition(|answered| answered.command.repeats(command))?;
-        let answered = self.recent.get_mut(at)?;
-        let age = now.since(answered.at);
-        let says_so = command.confirmation > 0 && age <= Answers::CONFIRMED;
-        let looks_so = Some(at) == newest_of_sender && age <= Answers::REPEATED;
-        if !says_so && !looks_so {
+    /// Only the newest command of a sender can be resent: off, engage, off are three requests, even if the last says
+    /// that it was sent before. Off and return are never resends: to act twice on them does no harm.
+    pub fn of_resend(&self, now: Instant, command: &Command) -> Option<CommandResult> {
+        if is_always_run(command) {
             return None;
         }
-        answered.at = now;
-        Some(answered.result)
+        let newest = self.recent.iter().rfind(|answered| answered.command.sender == command.sender)?;
+        let age = now.since(newest.at);
+        let says_so = command.confirmation > 0 && age <= Answers::CONFIRMED;
+        let looks_so = age <= Answers::REPEATED;
+        (newest.command.repeats(command) && (says_so || looks_so)).then_some(newest.result)
     }
 
     /// Remembers an answer.
@@ -116,4 +113,12 @@ impl Answers {
         }
         let _ = self.recent.push_back(Answered { command, result, at: now });
     }
+}
+
+/// Off and return take the aircraft out of our hands or home, and act however often they arrive.
+fn is_always_run(command: &Command) -> bool {
+    let [first, ..] = command.params;
+    let is = |id: MavCmd| id as u32 == u32::from(command.id);
+    is(MavCmd::MAV_CMD_USER_3)
+        || (is(MavCmd::MAV_CMD_USER_2) && Enable::from_value(first) == Some(Enable::Off))
 }

@@ -9,6 +9,7 @@ use crate::event::Events;
 use crate::identity::{Identity, Settled};
 use crate::parameter_service::ParameterService;
 use crate::requests::Requests;
+use crate::steering::Steering;
 use crate::text::Texts;
 use crate::{
     Address, Autopilot, AutopilotCommand, DecodeStats, Event, FrameDecoder, Message, MessageFault, Outgoing,
@@ -16,7 +17,7 @@ use crate::{
     TargetError,
 };
 use core::fmt;
-use gleaner_units::{Duration, Instant};
+use gleaner_units::{Duration, Instant, Ned};
 use mavlink::dialects::ardupilotmega::MavCmd;
 
 /// Who we are.
@@ -76,6 +77,8 @@ pub struct Status {
     pub state: SystemState,
     /// While false, the command to engage is temporarily rejected.
     pub may_engage: bool,
+    /// While false, the command to return is denied.
+    pub may_return: bool,
 }
 
 /// Why something was not sent.
@@ -118,6 +121,14 @@ pub struct LinkStats {
     pub texts_dropped: u32,
 }
 
+/// The last `GLN_ENABLE` that was set from outside.
+#[derive(Clone, Copy, Debug)]
+struct EnableSet {
+    sender: Address,
+    value: f32,
+    at: Instant,
+}
+
 /// One MAVLink component on one link.
 ///
 /// Call [`Component::receive`] with what arrived, [`Component::poll`] from the decision loop, take the events,
@@ -134,7 +145,10 @@ pub struct Component {
     requests: Requests,
     texts: Texts,
     events: Events,
-    may_engage: bool,
+    owner: Status,
+    steering: Steering,
+    revocations: u32,
+    enable_set: Option<EnableSet>,
     started_at: Option<Instant>,
     heartbeat_at: Option<Instant>,
     stats: LinkStats,
@@ -159,7 +173,10 @@ impl Component {
             requests: Requests::default(),
             texts: Texts::default(),
             events: Events::default(),
-            may_engage: false,
+            owner: Status { state: SystemState::Boot, may_engage: false, may_return: false },
+            steering: Steering::default(),
+            revocations: 0,
+            enable_set: None,
             started_at: None,
             heartbeat_at: None,
             stats: LinkStats::default(),
@@ -190,14 +207,18 @@ impl Component {
     /// Runs everything that depends on time: heartbeat, parameters, texts, requests, streams. Several times a
     /// second, from the decision loop and from nowhere else.
     pub fn poll(&mut self, now: Instant, status: &Status) {
-        self.may_engage = status.may_engage;
+        self.owner = *status;
         let started_at = *self.started_at.get_or_insert(now);
         if let Some(settled) = self.identity.poll(now) {
             self.tell_identity(settled);
         }
-        self.autopilot.poll(now, &mut self.outgoing, &mut self.events);
+        let wants_rc = self.parameters.data_weight_channel().is_some();
+        self.autopilot.poll(now, wants_rc, &mut self.outgoing, &mut self.events);
         match self.autopilot.address().filter(|_| self.autopilot.is_connected()) {
-            Some(address) => self.requests.poll(now, address, &mut self.outgoing, &mut self.events),
+            Some(address) => {
+                let ours_at = self.autopilot.ours_at();
+                self.requests.poll(now, address, ours_at, &mut self.outgoing, &mut self.events);
+            }
             None => self.requests.abandon(&mut self.events),
         }
         let speaks = self.identity.settled().is_some() || now.since(started_at) >= Component::PATIENCE;
@@ -251,17 +272,36 @@ impl Component {
     /// # Errors
     /// See [`NotSent`].
     pub fn steer(&mut self, now: Instant, target: &PositionTarget) -> Result<(), NotSent> {
-        self.send_setpoint(now, target)
+        self.send_setpoint(now, target)?;
+        self.steering.sent(now, target.position);
+        Ok(())
     }
 
-    /// Withdraws a position target that has not left yet: after a take-over nothing more may go out.
-    pub fn stop_steering(&mut self) {
-        self.outgoing.withdraw_setpoint();
-    }
-
-    /// Ends all requests of ours to the autopilot, without events: after a take-over none may be repeated.
-    pub fn withdraw_requests(&mut self) {
+    /// Withdraws every target and request of ours, without events: after a take-over nothing may leave and nothing may
+    /// be repeated. The program must drop the bytes that it holds as well, see [`Component::revocations`].
+    pub fn revoke(&mut self) {
+        self.outgoing.revoke();
         self.requests = Requests::default();
+        self.steering.end();
+        self.revocations = self.revocations.wrapping_add(1);
+    }
+
+    /// How often targets and requests were revoked. When it changes, frames that were taken by [`Component::transmit`]
+    /// and have not left yet must not leave any more.
+    #[must_use]
+    pub const fn revocations(&self) -> u32 {
+        self.revocations
+    }
+
+    /// The target of someone else that the autopilot followed since we began to steer.
+    #[must_use]
+    pub const fn foreign_target(&self) -> Option<Ned> {
+        self.steering.foreign()
+    }
+
+    /// Whether a heartbeat since the last call showed a mode in which we do not steer.
+    pub fn take_other_mode(&mut self) -> bool {
+        self.autopilot.take_other_mode()
     }
 
     /// Asks something of the autopilot, three times in three seconds, until it answers; ends with
@@ -338,6 +378,12 @@ impl Component {
 
     fn take_from_vehicle(&mut self, now: Instant, sender: Address, message: &Message) {
         self.autopilot.observe(now, sender, message, &mut self.events);
+        if let Message::FollowedTarget(target) = message
+            && self.autopilot.address() == Some(sender)
+        {
+            let origin = self.autopilot.origin().map(|origin| origin.point);
+            self.steering.follows(now, target, origin);
+        }
         if let Message::CommandAck(ack) = message
             && self.autopilot.address() == Some(sender)
         {

@@ -61,6 +61,7 @@ mod parameter_service;
 mod parameters;
 mod requests;
 mod setpoint;
+mod steering;
 mod streams;
 mod text;
 
@@ -71,9 +72,9 @@ pub use component::{Component, LinkStats, NotSent, Settings, SettingsError, Stat
 pub use event::{Event, TunnelPayload};
 pub use frame::{DecodeStats, Frame, FrameDecoder, MAX_PAYLOAD_BYTES, WireVersion};
 pub use message::{
-    BatteryStatus, ChargeState, Command, CommandAck, CommandForm, CommandResult, GlobalOrigin,
-    GlobalPosition, Heartbeat, HomePosition, LandedState, LocalPosition, Message, MessageFault, ParameterKey,
-    ParameterName, RcChannels, Severity, SysStatus, SystemState, Velocity,
+    BatteryStatus, ChargeState, Command, CommandAck, CommandForm, CommandResult, FollowedTarget,
+    GlobalOrigin, GlobalPosition, Heartbeat, HomePosition, LandedState, LocalPosition, Message, MessageFault,
+    ParameterKey, ParameterName, RcChannels, Severity, SysStatus, SystemState, Velocity,
 };
 pub use mode::{Firmware, FlightMode};
 pub use outgoing::{FrameBytes, Outgoing, OutgoingStats, Packet, Priority};

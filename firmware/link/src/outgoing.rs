@@ -1,7 +1,8 @@
 //! Packets waiting for the wire, and their framing.
 
-use crate::Address;
+use crate::{Address, AutopilotCommand};
 use heapless::{Deque, Vec};
+use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
 use mavlink::{MavlinkVersion, MessageData};
 
 /// Longest payload that this component sends: `COMPONENT_INFORMATION_BASIC`.
@@ -152,9 +153,15 @@ impl Outgoing {
         !self.bulk.is_full()
     }
 
-    /// Withdraws the setpoint that has not left yet.
-    pub fn withdraw_setpoint(&mut self) {
+    /// Withdraws the setpoint and the commands that move the aircraft, as far as they have not left.
+    pub fn revoke(&mut self) {
         self.setpoint = None;
+        // Once around, without them: `Deque::retain` may panic as far as a linker can tell.
+        for _ in 0..self.urgent.len() {
+            if let Some(packet) = self.urgent.pop_front().filter(|packet| !moves_the_aircraft(packet)) {
+                let _ = self.urgent.push_back(packet);
+            }
+        }
     }
 
     /// Fills `out` with bytes for the wire and returns how many; 0 when there is nothing to send. Holds whole
@@ -200,6 +207,14 @@ impl Outgoing {
             .or_else(|| self.setpoint.take())
             .or_else(|| self.urgent.pop_front())
             .or_else(|| self.bulk.pop_front())
+    }
+}
+
+/// Whether a packet is a command of [`crate::AutopilotCommand`].
+fn moves_the_aircraft(packet: &Packet) -> bool {
+    packet.message_id == COMMAND_LONG_DATA::ID && {
+        let command = crate::fields::Fields(&packet.payload).u16(28);
+        AutopilotCommand::KINDS.iter().any(|&kind| kind as u32 == u32::from(command))
     }
 }
 

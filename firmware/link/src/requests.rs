@@ -31,6 +31,10 @@ pub enum Outcome {
 }
 
 impl AutopilotCommand {
+    /// The commands behind all of them: each moves the aircraft.
+    pub(crate) const KINDS: [MavCmd; 3] =
+        [MavCmd::MAV_CMD_NAV_LAND, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, MavCmd::MAV_CMD_DO_CHANGE_SPEED];
+
     fn wire(self) -> (MavCmd, [f32; 3]) {
         match self {
             AutopilotCommand::Land => (MavCmd::MAV_CMD_NAV_LAND, [0.0; 3]),
@@ -74,6 +78,8 @@ struct Pending {
     command: AutopilotCommand,
     transmissions: u8,
     next_at: Instant,
+    begun_at: Instant,
+    sent_at: Option<Instant>,
 }
 
 /// The requests under way, at most one of a kind.
@@ -85,6 +91,8 @@ pub(crate) struct Requests {
 impl Requests {
     const INTERVAL: Duration = Duration::from_secs(1);
     const TRANSMISSIONS: u8 = 3;
+    /// A request ends after this time, however few transmissions were possible.
+    const LONGEST: Duration = Duration::from_secs(8);
     /// How long an acknowledgement "in progress" keeps us quiet.
     const PROGRESS: Duration = Duration::from_secs(5);
 
@@ -92,7 +100,13 @@ impl Requests {
     pub fn begin(&mut self, now: Instant, command: AutopilotCommand, events: &mut Events) {
         self.end(events, Outcome::Superseded, |pending| pending.command.is_same_kind(command));
         // There are fewer kinds than places.
-        let _ = self.pending.push(Pending { command, transmissions: 0, next_at: now });
+        let _ = self.pending.push(Pending {
+            command,
+            transmissions: 0,
+            next_at: now,
+            begun_at: now,
+            sent_at: None,
+        });
     }
 
     /// Ends everything: the autopilot is gone or started again.
@@ -116,18 +130,33 @@ impl Requests {
         self.end(events, outcome, is_it);
     }
 
-    /// Sends what is due.
-    pub fn poll(&mut self, now: Instant, autopilot: Address, out: &mut Outgoing, events: &mut Events) {
+    /// Sends what is due. `ours_at`: when a heartbeat last showed that the aircraft is ours. A request is repeated only
+    /// after such a heartbeat arrived since its last transmission: in between the aircraft may have changed hands.
+    pub fn poll(
+        &mut self,
+        now: Instant,
+        autopilot: Address,
+        ours_at: Option<Instant>,
+        out: &mut Outgoing,
+        events: &mut Events,
+    ) {
         self.end(events, Outcome::NoAnswer, |pending| {
-            now >= pending.next_at && pending.transmissions >= Requests::TRANSMISSIONS
+            let all_sent = now >= pending.next_at && pending.transmissions >= Requests::TRANSMISSIONS;
+            all_sent || now.since(pending.begun_at) >= Requests::LONGEST
         });
-        for pending in self.pending.iter_mut().filter(|pending| now >= pending.next_at) {
+        let is_due = |pending: &Pending| {
+            let heard_since =
+                ours_at.is_some_and(|ours_at| pending.sent_at.is_none_or(|sent_at| ours_at > sent_at));
+            now >= pending.next_at && pending.transmissions < Requests::TRANSMISSIONS && heard_since
+        };
+        for pending in self.pending.iter_mut().filter(|pending| is_due(pending)) {
             let (command, params) = pending.command.wire();
             let Some(packet) = command_packet(autopilot, command, params, pending.transmissions) else {
                 continue;
             };
             if out.push(Priority::Urgent, packet) {
                 pending.transmissions += 1;
+                pending.sent_at = Some(now);
                 pending.next_at = now + Requests::INTERVAL;
             }
         }

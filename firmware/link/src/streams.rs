@@ -21,7 +21,7 @@ const fn stream(message_id: u32, rate_hz: u64, only: Option<Firmware>) -> Stream
     Stream { message_id, period: Duration::from_micros(1_000_000 / rate_hz), only }
 }
 
-const COUNT: usize = 9;
+const COUNT: usize = 10;
 
 /// In the order of need.
 const STREAMS: [Stream; COUNT] = [
@@ -33,6 +33,7 @@ const STREAMS: [Stream; COUNT] = [
     stream(dialect::SYS_STATUS_DATA::ID, 2, None),
     stream(dialect::HOME_POSITION_DATA::ID, 1, None),
     stream(dialect::GLOBAL_POSITION_INT_DATA::ID, 2, None),
+    stream(dialect::POSITION_TARGET_LOCAL_NED_DATA::ID, 5, None),
     stream(dialect::RC_CHANNELS_DATA::ID, 5, None),
 ];
 
@@ -47,6 +48,7 @@ fn row_of(message: &Message) -> Option<usize> {
         Message::SysStatus(_) => dialect::SYS_STATUS_DATA::ID,
         Message::HomePosition(_) => dialect::HOME_POSITION_DATA::ID,
         Message::GlobalPosition(_) => dialect::GLOBAL_POSITION_INT_DATA::ID,
+        Message::FollowedTarget(_) => dialect::POSITION_TARGET_LOCAL_NED_DATA::ID,
         Message::RcChannels(_) => dialect::RC_CHANNELS_DATA::ID,
         _ => return None,
     };
@@ -59,6 +61,15 @@ struct Progress {
     answered: bool,
     seen_at: Option<Instant>,
     ask_at: Instant,
+}
+
+/// What is wanted beyond the streams that are always needed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wants {
+    /// The estimator's origin.
+    pub origin: bool,
+    /// RC channels: one is mapped to a parameter.
+    pub rc: bool,
 }
 
 /// How far the asking has come. A fresh one asks for everything.
@@ -97,16 +108,16 @@ impl Streams {
         }
     }
 
-    /// Asks for the next stream that is missing, and for the origin if `needs_origin`.
+    /// Asks for the next stream that is missing, and what else is wanted.
     pub fn poll(
         &mut self,
         now: Instant,
         target: Address,
         firmware: Firmware,
-        needs_origin: bool,
+        wants: Wants,
         out: &mut Outgoing,
     ) {
-        if needs_origin && now >= self.origin_ask_at {
+        if wants.origin && now >= self.origin_ask_at {
             let id = dialect::GPS_GLOBAL_ORIGIN_DATA::ID as f32;
             send(target, MavCmd::MAV_CMD_REQUEST_MESSAGE, [id, 0.0, 0.0], out);
             self.origin_ask_at = now + Streams::ACCEPTED;
@@ -116,6 +127,7 @@ impl Streams {
         }
         let missing = |&(row, stream): &(usize, &Stream)| {
             stream.only.is_none_or(|only| only == firmware || matches!(firmware, Firmware::Other(_)))
+                && (wants.rc || stream.message_id != dialect::RC_CHANNELS_DATA::ID)
                 && self.progress.get(row).is_some_and(|progress| progress.needs_asking(now, stream))
         };
         // The one that has waited longest; in the order of need among equals.

@@ -1,12 +1,12 @@
 //! What others ask of us.
 
-use super::{Component, count};
+use super::{Component, EnableSet, count};
 use crate::commands::{Effect, Requested, judge};
 use crate::{
     Address, Change, Command, CommandResult, Enable, Event, Message, OperatorRequest, ParameterError,
     ParameterId, ParameterKey, Severity, TUNNEL_RADIO_REPORT,
 };
-use gleaner_units::Instant;
+use gleaner_units::{Duration, Instant};
 
 impl Component {
     /// Acts on a message that is for us.
@@ -15,7 +15,9 @@ impl Component {
             Message::Command(command) => self.answer_command(now, command),
             Message::ParameterList { .. } => self.parameter_service.tell_all(),
             Message::ParameterRead { target, key } => self.answer_parameter_read(*target, key),
-            Message::ParameterSet { target, name, value } => self.answer_parameter_set(*target, name, *value),
+            Message::ParameterSet { target, name, value } => {
+                self.answer_parameter_set(now, sender, *target, name, *value);
+            }
             Message::TimesyncRequest { asked_ns, .. } => self.send_timesync(now, sender, *asked_ns),
             Message::Tunnel { payload_type: TUNNEL_RADIO_REPORT, payload, .. } => {
                 self.events.push(Event::RadioReport(payload.clone()));
@@ -35,7 +37,7 @@ impl Component {
             self.send_ack(command, result);
             return;
         }
-        let judged = judge(command, self.may_engage);
+        let judged = judge(command, &self.owner);
         let is_for_all = command.target.component == 0;
         let result = match judged {
             Ok(_) => CommandResult::Accepted,
@@ -52,6 +54,24 @@ impl Component {
             }
             Err(_) => self.answers.remember(now, *command, result),
         }
+    }
+
+    /// Whether a set of `GLN_ENABLE` repeats the last one of its sender because the answer was lost. It does not engage
+    /// again: meanwhile the pilot may have taken over. Off is no repetition. The first set counts, so that repetitions
+    /// do not prolong each other.
+    fn is_enable_resent(&mut self, now: Instant, sender: Address, name: &str, value: f32) -> bool {
+        const RESENT_WITHIN: Duration = Duration::from_secs(10);
+        if ParameterId::from_name(name) != Some(ParameterId::Enable) {
+            return false;
+        }
+        let is_resent = value != Enable::Off.value()
+            && self.enable_set.is_some_and(|set| {
+                set.sender == sender && set.value == value && now.since(set.at) <= RESENT_WITHIN
+            });
+        if !is_resent {
+            self.enable_set = Some(EnableSet { sender, value, at: now });
+        }
+        is_resent
     }
 
     fn send_requested(&mut self, now: Instant, requested: Requested) {
@@ -98,16 +118,29 @@ impl Component {
     }
 
     /// Always ends in the resulting value being told, except for names that are not ours.
-    fn answer_parameter_set(&mut self, target: Address, name: &str, value: f32) {
+    fn answer_parameter_set(
+        &mut self,
+        now: Instant,
+        sender: Address,
+        target: Address,
+        name: &str,
+        value: f32,
+    ) {
         if !self.events.has_room() {
             // Not set and not answered: the sender tries again.
             count(&mut self.stats.commands_postponed);
             return;
         }
+        if self.is_enable_resent(now, sender, name, value) {
+            self.parameter_service.tell(ParameterId::Enable);
+            return;
+        }
         match self.parameters.set(name, value) {
             Ok(change) => {
                 self.parameter_service.tell(change.id);
-                self.events.push(event_of(change));
+                if let Some(event) = event_of(change) {
+                    self.events.push(event);
+                }
             }
             Err(ParameterError::Unknown) => {
                 if target.component != 0 {
@@ -124,13 +157,19 @@ impl Component {
     }
 }
 
-/// A parameter that means the same as a command makes the same event.
-fn event_of(change: Change) -> Event {
-    match change.id {
+/// A parameter that means the same as a command makes the same event. `GLN_ENABLE` engages only on a change: a file
+/// that is loaded with the value in force asks for nothing. Off always acts.
+fn event_of(change: Change) -> Option<Event> {
+    let event = match change.id {
         ParameterId::DataWeight => Event::Operator(OperatorRequest::SetPreference(change.new)),
         ParameterId::Enable => {
-            Event::Operator(OperatorRequest::Enable(Enable::from_value(change.new).unwrap_or(Enable::Off)))
+            let enable = Enable::from_value(change.new).unwrap_or(Enable::Off);
+            if enable != Enable::Off && change.old == change.new {
+                return None;
+            }
+            Event::Operator(OperatorRequest::Enable(enable))
         }
         _ => Event::Parameter(change),
-    }
+    };
+    Some(event)
 }

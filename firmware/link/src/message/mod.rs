@@ -7,8 +7,8 @@ mod vehicle;
 pub use command::{Command, CommandAck, CommandForm, CommandResult};
 pub use parameter::{ParameterKey, ParameterName};
 pub use vehicle::{
-    BatteryStatus, ChargeState, GlobalOrigin, GlobalPosition, Heartbeat, HomePosition, LandedState,
-    LocalPosition, RcChannels, SysStatus, SystemState, Velocity,
+    BatteryStatus, ChargeState, FollowedTarget, GlobalOrigin, GlobalPosition, Heartbeat, HomePosition,
+    LandedState, LocalPosition, RcChannels, SysStatus, SystemState, Velocity,
 };
 
 use crate::fields::Fields;
@@ -43,6 +43,8 @@ pub enum Message {
     BatteryStatus(BatteryStatus),
     /// `LOCAL_POSITION_NED`.
     LocalPosition(LocalPosition),
+    /// `POSITION_TARGET_LOCAL_NED`, `POSITION_TARGET_GLOBAL_INT`.
+    FollowedTarget(FollowedTarget),
     /// `GLOBAL_POSITION_INT`.
     GlobalPosition(GlobalPosition),
     /// `HOME_POSITION`.
@@ -157,6 +159,12 @@ impl Message {
             }
             dialect::EXTENDED_SYS_STATE_DATA::ID => {
                 Message::LandedState(LandedState::from_wire(Fields(frame.payload()).u8(1)))
+            }
+            dialect::POSITION_TARGET_LOCAL_NED_DATA::ID => {
+                return Ok(FollowedTarget::read_local(Fields(frame.payload()))?.map(Message::FollowedTarget));
+            }
+            dialect::POSITION_TARGET_GLOBAL_INT_DATA::ID => {
+                return Ok(FollowedTarget::read_global(Fields(frame.payload()))?.map(Message::FollowedTarget));
             }
             dialect::RC_CHANNELS_DATA::ID => Message::RcChannels(RcChannels::read(Fields(frame.payload()))),
             _ => return Message::decode_conversation(frame),

@@ -247,6 +247,50 @@ impl TryFrom<dialect::GLOBAL_POSITION_INT_DATA> for GlobalPosition {
     }
 }
 
+/// The position target that the autopilot follows: `POSITION_TARGET_LOCAL_NED` or `POSITION_TARGET_GLOBAL_INT`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FollowedTarget {
+    /// In the local frame.
+    Local(Ned),
+    /// On the globe; its altitude has one of several references and is not read.
+    Global(GeoPoint),
+}
+
+impl FollowedTarget {
+    /// Bits 0..2 of `POSITION_TARGET_TYPEMASK`: no position is followed.
+    const POSITION_IGNORED: u16 = 0b111;
+
+    pub(super) fn read_local(fields: Fields<'_>) -> Result<Option<FollowedTarget>, MessageFault> {
+        if fields.u16(48) & FollowedTarget::POSITION_IGNORED != 0 {
+            return Ok(None);
+        }
+        let target = Ned { north_m: fields.f32(4), east_m: fields.f32(8), down_m: fields.f32(12) };
+        if target.is_finite() {
+            Ok(Some(FollowedTarget::Local(target)))
+        } else {
+            Err(MessageFault::NotFinite)
+        }
+    }
+
+    pub(super) fn read_global(fields: Fields<'_>) -> Result<Option<FollowedTarget>, MessageFault> {
+        if fields.u16(48) & FollowedTarget::POSITION_IGNORED != 0 {
+            return Ok(None);
+        }
+        geo_point(fields.i32(4), fields.i32(8)).map(FollowedTarget::Global).map(Some)
+    }
+
+    /// In the local frame with its origin at `origin`; a global target gets a down of NaN.
+    pub(crate) fn local(&self, origin: Option<GeoPoint>) -> Option<Ned> {
+        match self {
+            FollowedTarget::Local(target) => Some(*target),
+            FollowedTarget::Global(point) => {
+                let (north, east) = origin?.offset_to(point);
+                Some(Ned { north_m: north.0, east_m: east.0, down_m: f32::NAN })
+            }
+        }
+    }
+}
+
 /// `HOME_POSITION`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomePosition {

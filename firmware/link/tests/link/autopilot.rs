@@ -7,7 +7,7 @@ use gleaner_units::{Duration, MetresPerSecond, Ned};
 const COMMAND: u32 = 76;
 const SECOND: Duration = Duration::from_secs(1);
 
-fn heartbeat(custom_mode: u32, armed: bool, state: u8) -> Packet {
+pub fn heartbeat(custom_mode: u32, armed: bool, state: u8) -> Packet {
     let mode = custom_mode.to_le_bytes();
     let base = if armed { 0xD9 } else { 0x59 };
     Packet::from_payload(0, 50, &[mode[0], mode[1], mode[2], mode[3], 2, 3, base, state, 3]).unwrap()
@@ -19,13 +19,13 @@ fn position(time_boot_ms: u32) -> Packet {
     Packet::from_payload(32, 185, &payload).unwrap()
 }
 
-fn ack(command: u16, result: u8) -> Packet {
+pub fn ack(command: u16, result: u8) -> Packet {
     let [low, high] = command.to_le_bytes();
     Packet::from_payload(77, 143, &[low, high, result, 0, 0, 0, 0, 0, 42, 191]).unwrap()
 }
 
 /// Commands sent: id, first and second parameter, confirmation.
-fn commands(bench: &mut Bench) -> Vec<(u16, f32, f32, u8)> {
+pub fn commands(bench: &mut Bench) -> Vec<(u16, f32, f32, u8)> {
     let read = |frame: Frame| {
         let mut payload = frame.payload().to_vec();
         payload.resize(33, 0);
@@ -147,10 +147,11 @@ fn every_stream_is_asked_for_until_it_comes() {
         (1, 500_000),
         (242, 1_000_000),
         (33, 500_000),
-        (65, 200_000),
+        (85, 200_000),
     ] {
         assert!(streams.contains(&(id as f32, interval_us as f32)), "message {id} not in {streams:?}");
     }
+    assert!(!streams.iter().any(|&(id, _)| id == 65.0), "no RC channel is mapped");
     assert!(asked.iter().any(|ask| (ask.0, ask.1) == (512, 49.0)), "the origin is asked for");
     assert!(!streams.iter().any(|&(id, _)| id == 230.0), "PX4's estimator report is not asked of ArduPilot");
     // None came: asked for again. One comes: asked for no more.

@@ -182,7 +182,9 @@ fn what_we_send_is_what_the_other_implementation_would_have_sent() {
         move |bench: &mut Bench| {
             let now = bench.now();
             bench.component.request(now, command).unwrap();
-            bench.run(1_500);
+            bench.run(500);
+            bench.hear("heartbeat_copter_guided");
+            bench.run(1_000);
         }
     };
     sends("own_land", request(AutopilotCommand::Land));

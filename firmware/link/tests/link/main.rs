@@ -1,5 +1,6 @@
 //! The link crate from outside: bytes in, bytes out.
 
+mod authority;
 mod autopilot;
 mod conversation;
 mod framing;

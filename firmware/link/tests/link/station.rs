@@ -55,7 +55,7 @@ impl Bench {
 
     pub fn fresh() -> Bench {
         let component = Component::new(Settings::default(), Parameters::default());
-        let status = Status { state: SystemState::Active, may_engage: true };
+        let status = Status { state: SystemState::Active, may_engage: true, may_return: true };
         Bench { component, now_ms: 1_000, status }
     }
 

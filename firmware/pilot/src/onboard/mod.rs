@@ -220,7 +220,7 @@ impl<P: Policy> Onboard<P> {
         let out = self.machine.poll(now, &inputs, &mut self.policy);
         self.send(now, &out);
         let state = self.machine.system_state();
-        self.link.poll(now, &Status { state, may_engage: self.machine.may_engage() });
+        self.link.poll(now, &Status { state, may_engage: self.machine.may_engage(), may_return: true });
     }
 
     /// Moves bytes for the link into `buffer`; how many. Call until it gives 0.
@@ -367,8 +367,7 @@ impl<P: Policy> Onboard<P> {
 
     fn send(&mut self, now: Instant, out: &Outputs) {
         if out.withdraw {
-            self.link.stop_steering();
-            self.link.withdraw_requests();
+            self.link.revoke();
         }
         if let Some(position) = out.setpoint {
             // Not sent without an autopilot; its loss is in the next snapshot.

@@ -1,0 +1,137 @@
+//! The targets that we sent, compared with the target that the autopilot follows.
+//!
+//! GUIDED is not ownership: a ground station may send its own target in the same mode. The autopilot reports the target
+//! that it follows (`POSITION_TARGET_LOCAL_NED`, or `POSITION_TARGET_GLOBAL_INT` if another station asked for it). A
+//! new target that is not one of ours is a take-over.
+
+use crate::FollowedTarget;
+use gleaner_units::{Duration, GeoPoint, Instant, Metres, Ned};
+use heapless::Deque;
+
+/// Distinct targets that we sent lately, and the target that the autopilot follows.
+#[derive(Debug, Default)]
+pub(crate) struct Steering {
+    sent: Deque<(Instant, Ned), { Steering::REMEMBERED }>,
+    since: Option<Instant>,
+    followed: Option<Ned>,
+    foreign: Option<Ned>,
+}
+
+impl Steering {
+    /// At 10 Hz and one entry per [`Steering::SPACING`]: more than a second of a moving target.
+    const REMEMBERED: usize = 8;
+    /// Targets sent in quicker succession replace each other.
+    const SPACING: Duration = Duration::from_millis(200);
+    /// Before this the autopilot may still report the target of its take-off.
+    const SETTLE: Duration = Duration::from_secs(1);
+    /// Distance at which two targets differ: a moving target advances by 2 m between two remembered ones.
+    const TOLERANCE: Metres = Metres(3.0);
+
+    /// A target of ours leaves.
+    pub fn sent(&mut self, now: Instant, target: Ned) {
+        self.since.get_or_insert(now);
+        match self.sent.back().copied() {
+            Some((_, last)) if last == target => return,
+            Some((at, _)) if now.since(at) < Steering::SPACING => {
+                // Keeps the time of the first, so that a steady stream still adds an entry per spacing.
+                let _ = self.sent.pop_back();
+                let _ = self.sent.push_back((at, target));
+                return;
+            }
+            _ => {}
+        }
+        if self.sent.is_full() {
+            let _ = self.sent.pop_front();
+        }
+        let _ = self.sent.push_back((now, target));
+    }
+
+    /// The autopilot reports the target that it follows. `origin` ties a global target to the local frame.
+    pub fn follows(&mut self, now: Instant, reported: &FollowedTarget, origin: Option<GeoPoint>) {
+        let Some(since) = self.since else { return };
+        let Some(target) = reported.local(origin) else { return };
+        let is_known = self.sent.iter().any(|(_, ours)| same(ours, &target))
+            || self.followed.is_some_and(|followed| same(&followed, &target));
+        if !is_known && now.since(since) >= Steering::SETTLE {
+            self.foreign = Some(target);
+        }
+        self.followed = Some(target);
+    }
+
+    /// The target of someone else, if the autopilot followed one since we began to steer. Stays until [`Steering::end`].
+    pub const fn foreign(&self) -> Option<Ned> {
+        self.foreign
+    }
+
+    /// We stop steering: later targets are not ours to judge.
+    pub fn end(&mut self) {
+        *self = Steering::default();
+    }
+}
+
+fn same(a: &Ned, b: &Ned) -> bool {
+    a.horizontal_distance(b).0 <= Steering::TOLERANCE.0
+        && (!b.down_m.is_finite() || (a.down_m - b.down_m).abs() <= Steering::TOLERANCE.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(north_m: f32) -> Ned {
+        Ned { north_m, east_m: 0.0, down_m: -60.0 }
+    }
+
+    fn report(north_m: f32) -> FollowedTarget {
+        FollowedTarget::Local(at(north_m))
+    }
+
+    #[test]
+    fn a_new_target_that_we_did_not_send_is_foreign() {
+        let mut steering = Steering::default();
+        let ms = Instant::from_millis;
+        steering.follows(ms(0), &report(500.0), None);
+        steering.sent(ms(0), at(0.0));
+        steering.follows(ms(200), &report(-7.0), None);
+        assert_eq!(steering.foreign(), None, "the target of the take-off");
+        steering.follows(ms(1_500), &report(-7.0), None);
+        assert_eq!(steering.foreign(), None, "reported again, ours was dropped");
+        steering.follows(ms(1_600), &report(0.5), None);
+        steering.sent(ms(3_000), at(20.0));
+        steering.follows(ms(3_100), &report(0.0), None);
+        steering.follows(ms(3_200), &report(20.0), None);
+        assert_eq!(steering.foreign(), None);
+        steering.follows(ms(3_300), &report(300.0), None);
+        steering.follows(ms(3_400), &report(20.0), None);
+        assert_eq!(steering.foreign(), Some(at(300.0)), "also after ours is followed again");
+        steering.end();
+        assert_eq!(steering.foreign(), None);
+    }
+
+    #[test]
+    fn a_moving_target_is_recognised_between_its_samples() {
+        let mut steering = Steering::default();
+        for step in 0..60_u32 {
+            let now = Instant::from_millis(u64::from(step) * 100);
+            steering.sent(now, at(step as f32));
+            if step > 4 {
+                steering.follows(now, &report((step - 4) as f32), None);
+            }
+        }
+        assert_eq!(steering.foreign(), None);
+    }
+
+    #[test]
+    fn a_global_target_is_compared_in_the_plane() {
+        let origin = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 };
+        let mut steering = Steering::default();
+        steering.sent(Instant::ZERO, at(20.0));
+        let global = |north_m| FollowedTarget::Global(origin.offset_by(Metres(north_m), Metres(0.0)));
+        steering.follows(Instant::from_millis(2_000), &global(20.0), Some(origin));
+        assert_eq!(steering.foreign(), None);
+        steering.follows(Instant::from_millis(2_500), &global(90.0), None);
+        assert_eq!(steering.foreign(), None, "without an origin nothing can be compared");
+        steering.follows(Instant::from_millis(3_000), &global(90.0), Some(origin));
+        assert!(steering.foreign().is_some());
+    }
+}
