@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// Folder and rank of every member.
-const RANKS: [(&str, u8); 13] = [
+const RANKS: [(&str, u8); 14] = [
     ("firmware/units", 0),
     ("firmware/ports", 0),
     ("firmware/guard", 1),
@@ -14,6 +14,7 @@ const RANKS: [(&str, u8); 13] = [
     ("firmware/link", 1),
     ("firmware/radio", 1),
     ("firmware/pilot", 2),
+    ("firmware/dashboard", 2),
     ("firmware/companion", 3),
     ("firmware/cortex-m", 3),
     ("sitl/world", 1),

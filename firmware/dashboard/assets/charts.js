@@ -1,0 +1,56 @@
+// Data and battery over time, and the what-if strip.
+const Charts = {
+  draw(flight, t) {
+    const points = flight.live;
+    const span = Math.max(1, flight.end - flight.start);
+    const units = flight.scene.battery_units || Math.max(1, ...points.map((p) => p.battery_units || 0));
+    byId("charts").replaceChildren(this.chart("Share of the data collected and of the battery units left, over time", [
+      { name: "data collected", colour: "var(--data)", value: (p) => p.collected },
+      { name: "battery left", colour: "var(--battery)", value: (p) => (p.battery_units === null ? null : p.battery_units / units) },
+    ], points, flight.start, span, t));
+  },
+
+  chart(words, series, points, start, span, t) {
+    const [width, height, left, bottom] = [600, 150, 40, 22];
+    const x = (time) => left + ((width - left - 8) * (time - start)) / span;
+    const y = (share) => 8 + (height - bottom - 8) * (1 - Math.min(1, share));
+    const drawing = shape("svg", { class: "chart", viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": words });
+    const label = (text, px, py, anchor = "end") =>
+      shape("text", { x: px, y: py, "text-anchor": anchor, "font-size": 11, fill: "var(--soft)" }, text);
+    for (const share of [0, 0.5, 1]) {
+      drawing.append(shape("line", { x1: left, x2: width - 8, y1: y(share), y2: y(share), stroke: "var(--line)" }),
+        label(`${100 * share} %`, left - 4, y(share) + 4));
+    }
+    drawing.append(label(clock(start), left, height - 6, "start"), label(clock(start + span), width - 8, height - 6));
+    series.forEach(({ name, colour: stroke, value }, index) => {
+      const shown = points.filter((p) => value(p) !== null && value(p) !== undefined);
+      const line = shown.map((p) => `${x(p.t_s).toFixed(1)},${y(value(p)).toFixed(1)}`).join(" ");
+      drawing.append(shape("polyline", { points: line, fill: "none", stroke, "stroke-width": 2 }),
+        shape("text", { x: left + 10 + 130 * index, y: 20, "font-size": 12, fill: stroke, "font-weight": 600 }, name));
+    });
+    drawing.append(shape("line", { x1: x(t), x2: x(t), y1: 8, y2: height - bottom, stroke: "var(--ink)" }));
+    return drawing;
+  },
+
+  whatIf(flight) {
+    const box = byId("what-if-box");
+    box.hidden = !flight.whatIf;
+    if (!flight.whatIf) return;
+    const { grid, devices, terminal } = flight.scene;
+    const live = flight.liveAt(flight.end);
+    const up = (y) => grid.height - y;
+    byId("what-if").replaceChildren(...flight.whatIf.options.map((option) => {
+      const now = live && Math.abs(live.w_data - option.w) < 1e-6;
+      const drawing = shape("svg", { viewBox: `0 0 ${grid.width} ${grid.height}`, role: "img",
+        "aria-label": `Predicted path at a preference of ${option.w}` },
+      ...devices.map((d) => shape("circle", { cx: d.x + 0.5, cy: up(d.y + 0.5), r: 0.7, fill: "var(--device)" })),
+      shape("rect", { x: terminal[0], y: up(terminal[1] + 1), width: 1, height: 1, fill: "var(--terminal)" }),
+      MapView.path(option.path, up, ""));
+      drawing.lastChild.setAttribute("style", "fill:none;stroke:var(--path);stroke-width:.5");
+      return element("div", { class: now ? "card now" : "card" }, drawing,
+        element("p", {}, element("strong", {}, `w = ${option.w}`), now ? " (now)" : ""),
+        element("p", {}, `brings home ${percent(option.collected, 0)}`),
+        element("p", {}, `for ${number(option.energy, 1)} more units`));
+    }));
+  },
+};

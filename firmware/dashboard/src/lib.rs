@@ -1,0 +1,40 @@
+//! The flight as a page: the city, the aircraft, the devices, the decisions and what they attended to.
+//!
+//! Two programs show the page: `gleaner run --http` and `gleaner-sitl serve` serve it live ([`Server`]);
+//! `gleaner report` and `gleaner-sitl fly --html` write it as one file for a finished flight ([`render`]). Both show
+//! the same [`Flight`].
+//!
+//! ```text
+//!  decision loop --Event--> channel --> server thread --event stream--> browsers
+//!  decision loop <--Order-- channel <-- server thread <--POST---------- browsers
+//! ```
+//! The server runs on a thread of its own. The decision loop hands it events through a bounded channel and never waits:
+//! an event that finds the channel full is dropped and counted.
+//!
+//! # Access
+//! On a loopback address everybody on this computer may look and command. On any other address the server refuses to
+//! start without tokens: one to look, one to command ([`Access`]). A token travels in the `Authorization` header, never
+//! in a cookie, so no other site can use it. Requests whose `Host` or `Origin` does not belong to the page are refused,
+//! bodies are at most 1 KiB, connections and viewers are counted and bounded, commands are limited in rate.
+//!
+//! # Commands
+//! The page has no way to the aircraft of its own. An [`Order`] becomes a MAVLink command of a ground station
+//! ([`GroundClient`]), passes the same checks as any other, and the page shows the acknowledgement.
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+mod access;
+mod flight;
+mod ground;
+mod order;
+mod page;
+mod server;
+
+pub use access::{Access, AccessError, Token};
+pub use flight::{
+    Decision, Device, DeviceState, Event, Flight, Grid, Live, Scene, Text, WhatIf, WhatIfOption,
+};
+pub use ground::GroundClient;
+pub use order::{Command, Order, Request};
+pub use page::render;
+pub use server::{Server, ServerError};
