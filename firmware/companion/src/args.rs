@@ -39,7 +39,9 @@ pub enum Command {
         #[arg(long, value_name = "FILE")]
         config: Option<PathBuf>,
     },
-    /// Decide a decision log again, with the model that flew or with another one, and say what is decided otherwise.
+    /// List the serial devices of this machine and their USB names.
+    Ports,
+    /// Replay a decision log of `gleaner` or `gleaner-sitl` and list the decisions that change.
     Replay(Replay),
 }
 
@@ -159,12 +161,11 @@ mod tests {
 
     #[test]
     fn a_wrong_endpoint_is_one_line_that_shows_a_right_one() {
-        let Err(error) = CommandLine::try_parse_from(["gleaner", "run", "--autopilot", "tcp:1.2.3.4:5"])
-        else {
+        let Err(error) = CommandLine::try_parse_from(["gleaner", "run", "--autopilot", "1.2.3.4:5"]) else {
             panic!("accepted");
         };
         let line = one_line(&error.to_string());
-        assert!(line.contains("'tcp:1.2.3.4:5' is not an endpoint: it must begin with udpin:"), "{line}");
+        assert!(line.contains("did you mean udpout:1.2.3.4:5?"), "{line}");
         assert!(!line.contains('\n') && !line.contains("Usage"), "{line}");
     }
 }

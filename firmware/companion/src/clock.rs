@@ -1,22 +1,18 @@
-//! The program's clock: monotonic, from zero at the start.
+//! The program's clock: monotonic, zero at its first use.
 
 use gleaner_units::Instant;
+use std::sync::LazyLock;
+use std::time;
 
-/// Where the pilot's time comes from.
-#[derive(Clone, Copy)]
-pub struct Clock {
-    start: std::time::Instant,
+static START: LazyLock<time::Instant> = LazyLock::new(time::Instant::now);
+
+/// The time now.
+pub fn now() -> Instant {
+    at(time::Instant::now())
 }
 
-impl Clock {
-    /// A clock that shows zero now.
-    pub fn start() -> Clock {
-        Clock { start: std::time::Instant::now() }
-    }
-
-    /// What the clock shows when the system shows `at`.
-    pub fn at(&self, at: std::time::Instant) -> Instant {
-        let since = at.saturating_duration_since(self.start);
-        Instant::from_micros(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
-    }
+/// The time of the program's clock when the system's monotonic clock shows `at`.
+pub fn at(at: time::Instant) -> Instant {
+    let since = at.saturating_duration_since(*START);
+    Instant::from_micros(u64::try_from(since.as_micros()).unwrap_or(u64::MAX))
 }

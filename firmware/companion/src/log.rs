@@ -4,43 +4,17 @@
 //! never waits for a disk. What could not be written is counted, and said once.
 
 use crate::error::StartError;
-use gleaner_pilot::Decision;
-use gleaner_policy::Tokens;
-use serde::Serialize;
+use gleaner_pilot::{Decision, LoggedDecision};
+use gleaner_units::Duration;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Lines that wait for a slow disk: minutes of decisions.
 const LINES_WAITING: usize = 256;
-
-/// One line. The tokens are the model's whole input, so that a decision can be made again from it.
-#[derive(Serialize)]
-struct Line<'d> {
-    /// When this run started, seconds since 1970 by the system's clock: tells runs in one file apart.
-    run_s: u64,
-    sequence: u32,
-    /// Since the start of the run.
-    time_us: u64,
-    state: &'static str,
-    cell: [i16; 2],
-    action: &'static str,
-    mask: Vec<&'static str>,
-    battery: f32,
-    spare: f32,
-    w_data: f32,
-    collected: f32,
-    /// `null` where the guard decided alone.
-    logits: Option<[f32; 5]>,
-    attended: Option<u16>,
-    infer_us: Option<u64>,
-    /// The mission's index of the device in each device token.
-    slots: &'d [u16],
-    tokens: &'d Tokens,
-}
 
 /// The open log.
 pub struct DecisionLog {
@@ -89,26 +63,8 @@ impl DecisionLog {
 }
 
 fn line(run_s: u64, decision: &Decision, inference_time: Option<Duration>) -> String {
-    let line = Line {
-        run_s,
-        sequence: decision.sequence,
-        time_us: decision.time.as_micros(),
-        state: decision.state.name(),
-        cell: [decision.cell.x, decision.cell.y],
-        action: decision.action.name(),
-        mask: decision.mask.iter().map(|action| action.name()).collect(),
-        battery: decision.battery.0,
-        spare: decision.spare.0,
-        w_data: decision.preference.w_data(),
-        collected: decision.collected,
-        logits: decision.inference.as_ref().map(|inference| inference.logits),
-        attended: decision.attended,
-        infer_us: inference_time.map(|took| u64::try_from(took.as_micros()).unwrap_or(u64::MAX)),
-        slots: &decision.slots,
-        tokens: &decision.tokens,
-    };
     // Serialising cannot fail: every key is a string.
-    serde_json::to_string(&line).unwrap_or_default()
+    serde_json::to_string(&LoggedDecision::new(run_s, decision, inference_time)).unwrap_or_default()
 }
 
 fn write_all(lines: &Receiver<String>, file: File) {

@@ -16,9 +16,9 @@ mod error;
 mod load;
 mod log;
 mod params;
+mod ports;
 mod replay;
 mod run;
-mod timed;
 
 use std::process::ExitCode;
 
@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Ok(args::Command::Bench(order)) => bench::bench(&order),
         Ok(args::Command::Convert(conversion)) => convert::convert(&conversion),
         Ok(args::Command::Params { config }) => params::params(config.as_deref()),
+        Ok(args::Command::Ports) => Ok(ports::ports()),
         Ok(args::Command::Replay(order)) => replay::replay(&order),
         Err(answered) => return answered,
     };

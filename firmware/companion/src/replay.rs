@@ -1,22 +1,22 @@
-//! `gleaner replay`: decides a decision log again and compares.
+//! `gleaner replay`: makes the decisions of a log again and lists those that change.
 //!
-//! What flew is in the log whole: what the model saw, what it answered, what the guard allowed. So after a flight, or
-//! before another model flies, everybody can see what would have been decided.
+//! A log holds the input and the answer of the model and the actions that the guard allowed. It may come from
+//! `gleaner run` or from a simulator.
 
 use crate::args::Replay;
 use crate::error::StartError;
 use crate::load;
-use gleaner_policy::{Engine, Policy, Tokens};
-use gleaner_units::{Action, ActionMask};
-use serde::Deserialize;
+use gleaner_pilot::LoggedDecision;
+use gleaner_policy::{Engine, Policy};
+use gleaner_units::Action;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::process::ExitCode;
 
-/// Of each kind so many lines are shown one by one; the others are counted.
+/// Lines printed of each kind; the rest is only counted.
 const SHOWN: u64 = 10;
 
-/// Prints what is decided otherwise, and how far logits are apart.
+/// Prints the decisions that change and the largest difference of a logit.
 ///
 /// # Errors
 /// The model or the log cannot be read, or the log holds no decision.
@@ -25,63 +25,36 @@ pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
     let log = BufReader::new(File::open(&order.log).map_err(unreadable)?);
     let engine = load::model(&order.model, order.engine)?;
     println!("{}, engine {} ({})", engine.name(), order.engine.name(), order.model.display());
-    let mut again = Again { engine, findings: Findings::default() };
+    let mut comparison = Comparison { engine, findings: Findings::default() };
     for (index, line) in log.split(b'\n').enumerate() {
         let line = line.map_err(unreadable)?;
         match serde_json::from_slice(&line) {
-            Ok(logged) => again.decide(&logged),
+            Ok(logged) => comparison.decide(&logged),
             // A full disk leaves half a line.
-            Err(error) => again.findings.note(Kind::Skipped, || {
-                format!("line {} is not a decision of `gleaner run`: {error}", index + 1)
-            }),
+            Err(error) => comparison
+                .findings
+                .note(Kind::Skipped, || format!("line {} is not a decision: {error}", index + 1)),
         }
     }
-    let Findings { counts, furthest } = again.findings;
-    let [alike, differing, guards, skipped] = counts;
-    if alike + differing + guards == 0 {
+    let Findings { counts, furthest } = comparison.findings;
+    let [equal, different, guards, skipped] = counts;
+    if equal + different + guards == 0 {
         return Err(StartError::NoDecisions { path: order.log.clone() });
     }
-    println!("decided as logged        {alike}");
-    println!("decided otherwise        {differing}");
-    println!("by the guard, no model   {guards}");
-    println!("lines skipped            {skipped}");
-    println!("logits apart by at most  {furthest:.1e}");
-    // Nothing compared is no success.
-    Ok(if differing == 0 && alike > 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
+    println!("decisions equal             {equal}");
+    println!("decisions different         {different}");
+    println!("by the guard, not replayed  {guards}");
+    println!("lines skipped               {skipped}");
+    println!("largest logit difference    {furthest:.1e}");
+    // A log without a decision of the model proves nothing.
+    Ok(if different == 0 && equal > 0 { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-/// What is read of a line; [`crate::log`] writes more.
-#[derive(Deserialize)]
-struct Logged {
-    run_s: u64,
-    sequence: u32,
-    #[serde(deserialize_with = "action")]
-    action: Action,
-    #[serde(deserialize_with = "mask")]
-    mask: ActionMask,
-    logits: Option<[f32; Action::COUNT]>,
-    tokens: Tokens,
-}
-
-fn named<E: serde::de::Error>(name: &str) -> Result<Action, E> {
-    let found = Action::ALL.into_iter().find(|action| action.name() == name);
-    found.ok_or_else(|| E::custom(format_args!("there is no action {name:?}")))
-}
-
-fn action<'d, D: serde::Deserializer<'d>>(from: D) -> Result<Action, D::Error> {
-    named(&String::deserialize(from)?)
-}
-
-fn mask<'d, D: serde::Deserializer<'d>>(from: D) -> Result<ActionMask, D::Error> {
-    let names = Vec::<String>::deserialize(from)?;
-    names.iter().try_fold(ActionMask::EMPTY, |mask, name| Ok(mask.with(named(name)?)))
-}
-
-/// What comes of a line.
+/// The result for one line.
 #[derive(Clone, Copy)]
 enum Kind {
-    Alike,
-    Differing,
+    Equal,
+    Different,
     Guards,
     Skipped,
 }
@@ -96,23 +69,23 @@ struct Findings {
 impl Findings {
     fn note(&mut self, kind: Kind, text: impl FnOnce() -> String) {
         self.counts[kind as usize] += 1;
-        if matches!(kind, Kind::Differing | Kind::Skipped) {
+        if matches!(kind, Kind::Different | Kind::Skipped) {
             match self.counts[kind as usize] {
                 ..=SHOWN => println!("{}", text()),
-                count if count == SHOWN + 1 => println!("and more of these, counted below"),
+                count if count == SHOWN + 1 => println!("more of these follow; they are counted below"),
                 _ => {}
             }
         }
     }
 }
 
-struct Again {
+struct Comparison {
     engine: Engine,
     findings: Findings,
 }
 
-impl Again {
-    fn decide(&mut self, logged: &Logged) {
+impl Comparison {
+    fn decide(&mut self, logged: &LoggedDecision) {
         let Some(logits) = logged.logits else {
             return self.findings.note(Kind::Guards, String::new);
         };
@@ -122,17 +95,17 @@ impl Again {
             Ok(answer) => answer,
             Err(error) => {
                 let how = || differs(format!("logged {was}, now no answer: {error}"));
-                return self.findings.note(Kind::Differing, how);
+                return self.findings.note(Kind::Different, how);
             }
         };
-        let apart = |(then, now): (&f32, &f32)| (then - now).abs();
-        let furthest = logits.iter().zip(&answer.logits).map(apart).fold(0.0, f32::max);
+        let difference = |(then, now): (&f32, &f32)| (then - now).abs();
+        let furthest = logits.iter().zip(&answer.logits).map(difference).fold(0.0, f32::max);
         self.findings.furthest = self.findings.furthest.max(furthest);
         match logged.mask.argmax(&answer.logits) {
-            Some(action) if action == logged.action => self.findings.note(Kind::Alike, String::new),
-            decided => self.findings.note(Kind::Differing, || {
+            Some(action) if action == logged.action => self.findings.note(Kind::Equal, String::new),
+            decided => self.findings.note(Kind::Different, || {
                 let now = decided.map_or("nothing", Action::name);
-                differs(format!("logged {was}, now {now}; logits up to {furthest:.1e} apart"))
+                differs(format!("logged {was}, now {now}; logits differ by up to {furthest:.1e}"))
             }),
         }
     }

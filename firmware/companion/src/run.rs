@@ -4,31 +4,27 @@
 //! and heartbeat hang off that poll: when this loop stops, both stop, and the autopilot's own failsafes act.
 
 use crate::args::Setup;
-use crate::clock::Clock;
+use crate::clock;
 use crate::config::{self, Config};
 use crate::error::StartError;
 use crate::load;
 use crate::log::DecisionLog;
-use crate::timed::Timed;
-use gleaner_link::Severity;
-use gleaner_pilot::{Onboard, State};
-use gleaner_policy::Engine;
+use gleaner_link::{MAX_FRAME_BYTES, Severity};
+use gleaner_pilot::{Onboard, POLL_INTERVAL, State};
+use gleaner_policy::{Engine, Timed};
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
-use gleaner_units::Duration as PilotDuration;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use tracing_appender::non_blocking::WorkerGuard;
 
-/// Time between polls of the pilot, which wants 20 Hz or more.
-const TICK: Duration = Duration::from_millis(20);
+/// Time between polls of the pilot.
+const TICK: Duration = Duration::from_micros(POLL_INTERVAL.as_micros());
 /// Reads per port and wake-up: a flood on one port must not starve the poll.
 const READS_PER_WAKE: usize = 32;
 /// How long the last words may take: status texts leave at ten a second.
 const GOODBYE: Duration = Duration::from_millis(300);
-/// Longest MAVLink 2 frame: header 10, payload 255, checksum 2, signature 13.
-const FRAME_BYTES: usize = 280;
 
 /// Opens everything, then flies until interrupted.
 ///
@@ -40,16 +36,21 @@ pub fn run(setup: &Setup) -> Result<ExitCode, StartError> {
     let engine = load::model(&config.model, config.engine)?;
     let model = format!("{}, engine {engine}", engine.name());
     // The engine reproduced its golden pairs, or it would not have been loaded.
-    let onboard =
-        Onboard::new(mission, config.parameters.clone(), config.settings, Timed::new(engine), Ok(()))
-            .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
+    let onboard = Onboard::new(
+        mission,
+        config.parameters.clone(),
+        config.settings,
+        Timed::new(engine, clock::now),
+        Ok(()),
+    )
+    .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
     let log = config.log_dir.as_deref().map(DecisionLog::open).transpose()?;
     let link = open("autopilot", &config.autopilot)?;
     let radio = config.radio.as_ref().map(|endpoint| open("radio", endpoint)).transpose()?;
-    let stop = gleaner_ports::asked_to_end().map_err(StartError::Signals)?;
+    let stop = gleaner_ports::end_requested().map_err(StartError::Signals)?;
     let _messages = start_messages();
     introduce(&config, &model, &link, radio.as_ref());
-    let mut flight = Flight { onboard, link, radio, log, clock: Clock::start(), said: State::Boot };
+    let mut flight = Flight { onboard, link, radio, log, said: State::Boot };
     flight.fly(|| stop.load(Ordering::Relaxed));
     flight.end();
     Ok(ExitCode::SUCCESS)
@@ -94,7 +95,6 @@ struct Flight {
     link: Port,
     radio: Option<Port>,
     log: Option<DecisionLog>,
-    clock: Clock,
     said: State,
 }
 
@@ -120,7 +120,7 @@ impl Flight {
             if bytes == 0 {
                 break;
             }
-            self.onboard.receive_link(self.clock.at(Instant::now()), &buffer[..bytes]);
+            self.onboard.receive_link(clock::now(), &buffer[..bytes]);
         }
         let Some(radio) = &mut self.radio else { return };
         for _ in 0..READS_PER_WAKE {
@@ -128,17 +128,16 @@ impl Flight {
             if bytes == 0 {
                 break;
             }
-            self.onboard.receive_radio(self.clock.at(Instant::now()), &buffer[..bytes]);
+            self.onboard.receive_radio(clock::now(), &buffer[..bytes]);
         }
     }
 
     fn tick(&mut self, now: Instant) {
         self.mend(now);
-        self.onboard.poll(self.clock.at(now));
+        self.onboard.poll(clock::at(now));
         let took = self.onboard.policy().take();
         if let Some(took) = took {
-            let micros = u64::try_from(took.as_micros()).unwrap_or(u64::MAX);
-            self.onboard.set_inference_time(PilotDuration::from_micros(micros));
+            self.onboard.set_inference_time(took);
         }
         if let Some(decision) = self.onboard.decision() {
             let (cell, action, battery) = (decision.cell, decision.action.name(), decision.battery.0);
@@ -177,7 +176,7 @@ impl Flight {
     }
 
     fn speak(&mut self) {
-        let mut frame = [0; FRAME_BYTES];
+        let mut frame = [0; MAX_FRAME_BYTES];
         loop {
             let bytes = self.onboard.transmit(&mut frame);
             if bytes == 0 {

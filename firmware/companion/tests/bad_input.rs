@@ -133,7 +133,7 @@ fn configurations() {
         (
             "udpin:127.0.0.1:0",
             "udpin:0",
-            &["line 3: autopilot: 'udpin:0' is not an endpoint: ", "write HOST:PORT as in"],
+            &["line 3: autopilot: 'udpin:0' is not an endpoint: ", "write HOST:PORT, as in"],
         ),
         (
             "GLN_W_DATA = 0.25",

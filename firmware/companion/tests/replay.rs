@@ -50,7 +50,7 @@ fn a_decision_that_is_made_otherwise_is_named_and_the_verdict_is_negative() {
     other["logits"] = json!([4.5, 4.0, 3.0, 2.0, 5.0]);
     let (code, stdout, stderr) = replay(&format!("{}\n{other}\n", line(0)));
     assert_eq!((code, stderr.as_str()), (Some(1), ""), "{stdout}");
-    let told = "run 7, decision 1: logged east, now hover; logits up to 4.0e0 apart";
+    let told = "run 7, decision 1: logged east, now hover; logits differ by up to 4.0e0";
     assert!(stdout.lines().any(|line| line == told), "{stdout}");
     assert_eq!(counts(&stdout), ["1", "1", "0", "0", "4.0e0"]);
 }
@@ -78,7 +78,7 @@ fn half_a_line_is_skipped_and_said() {
     let whole = line(0).to_string();
     let (code, stdout, _) = replay(&format!("{}\n{whole}\n", &whole[..100]));
     assert_eq!(code, Some(0), "{stdout}");
-    assert!(stdout.contains("line 1 is not a decision of `gleaner run`: "), "{stdout}");
+    assert!(stdout.contains("line 1 is not a decision: "), "{stdout}");
     assert_eq!(counts(&stdout), ["1", "0", "0", "1", "0.0e0"]);
 }
 

@@ -37,7 +37,6 @@ mod port;
 mod ring;
 mod runtime;
 mod store;
-mod timed;
 
 pub use journal::Journal;
 pub use keeper::{Keeper, News};
@@ -46,4 +45,3 @@ pub use port::{Endpoint, LineFault, Port, PortStats, Uart};
 pub use ring::Ring;
 pub use runtime::Runtime;
 pub use store::{Found, ParameterStore, SaveError};
-pub use timed::Timed;

@@ -1,27 +1,23 @@
 //! The main loop of every board: bytes in, a poll every 20 ms, bytes out.
 
-use crate::{Journal, PortStats, Timed};
+use crate::{Journal, PortStats};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
-use gleaner_link::Severity;
-use gleaner_pilot::{Onboard, State};
-use gleaner_policy::Policy;
+use gleaner_link::{MAX_FRAME_BYTES, Severity};
+use gleaner_pilot::{Onboard, POLL_INTERVAL, State};
+use gleaner_policy::{Policy, Timed};
 use gleaner_units::{Duration, Instant};
 
-/// Time between polls of the pilot, which wants 20 Hz or more.
-const TICK: Duration = Duration::from_millis(20);
 /// Bytes taken from one port in one pass: a flood on one port must not starve the poll.
 const BYTES_PER_PASS: usize = 512;
 /// Bytes handed to the decoders at once.
 const CHUNK: usize = 64;
-/// Longest MAVLink 2 frame: header 10, payload 255, checksum 2, signature 13.
-const FRAME_BYTES: usize = 280;
 /// Losses on a port are said this often at most.
 const SAY_LOSSES_EVERY: Duration = Duration::from_secs(10);
 
 /// A frame on its way out. The next one is asked for only when this one has left, so that a setpoint never waits
 /// behind telemetry that is older.
 struct Leaving {
-    bytes: [u8; FRAME_BYTES],
+    bytes: [u8; MAX_FRAME_BYTES],
     start: usize,
     end: usize,
 }
@@ -73,7 +69,7 @@ where
             onboard,
             link,
             radio,
-            leaving: Leaving { bytes: [0; FRAME_BYTES], start: 0, end: 0 },
+            leaving: Leaving { bytes: [0; MAX_FRAME_BYTES], start: 0, end: 0 },
             next_tick: Instant::ZERO,
             said: State::Boot,
             watches: [Watch::new("link"), Watch::new("radio")],
@@ -90,7 +86,7 @@ where
         let due = now >= self.next_tick;
         if due {
             self.tick(now, losses, journal);
-            self.next_tick = (self.next_tick + TICK).max(now);
+            self.next_tick = (self.next_tick + POLL_INTERVAL).max(now);
         }
         self.speak();
         due

@@ -15,9 +15,10 @@ const HEADER_V2: usize = 10;
 const CHECKSUM: usize = 2;
 const SIGNATURE: usize = 13;
 const FLAG_SIGNED: u8 = 0x01;
-const LONGEST_FRAME: usize = HEADER_V2 + MAX_PAYLOAD_BYTES + CHECKSUM + SIGNATURE;
+/// Longest MAVLink 2 frame, with signature.
+pub const MAX_FRAME_BYTES: usize = HEADER_V2 + MAX_PAYLOAD_BYTES + CHECKSUM + SIGNATURE;
 /// Room for one incomplete frame and as much again to read ahead.
-const CAPACITY: usize = 2 * LONGEST_FRAME;
+const CAPACITY: usize = 2 * MAX_FRAME_BYTES;
 
 /// Which protocol version a frame came in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -70,7 +70,7 @@ pub use autopilot::{Autopilot, Failsafe};
 pub use commands::OperatorRequest;
 pub use component::{Component, LinkStats, NotSent, Settings, SettingsError, Status};
 pub use event::{Event, TunnelPayload};
-pub use frame::{DecodeStats, Frame, FrameDecoder, MAX_PAYLOAD_BYTES, WireVersion};
+pub use frame::{DecodeStats, Frame, FrameDecoder, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, WireVersion};
 pub use message::{
     BatteryStatus, ChargeState, Command, CommandAck, CommandForm, CommandResult, FollowedTarget,
     GlobalOrigin, GlobalPosition, Heartbeat, HomePosition, LandedState, LocalPosition, Message, MessageFault,

@@ -47,6 +47,8 @@ mod states;
 mod vehicle;
 
 pub use decide::{Decision, DecisionRecord, RECORD_BYTES_MAX};
+#[cfg(feature = "std")]
+pub use decide::{LoggedDecision, SimulatedSlot};
 pub use exchange::{Inputs, Notice, Outputs, Request, Telemetry};
 pub use machine::Machine;
 #[cfg(feature = "std")]
@@ -56,6 +58,9 @@ pub use mission::{DeviceSite, MAX_DEVICES, Mission, MissionError};
 pub use onboard::{Onboard, OnboardError, Settings, Stats};
 pub use state::{Fault, Missing, ReturnReason, State};
 pub use vehicle::Vehicle;
+
+/// Time between polls by the programs. The pilot needs 20 Hz or more.
+pub const POLL_INTERVAL: gleaner_units::Duration = gleaner_units::Duration::from_millis(20);
 
 // The link owns these nouns; they are part of the pilot's interface.
 pub use gleaner_link::{AutopilotCommand, Enable, ParameterError, ParameterId, Parameters, Severity};

@@ -50,6 +50,19 @@ pub enum State {
 }
 
 impl State {
+    /// Every state.
+    pub const ALL: [State; 9] = [
+        State::Boot,
+        State::Idle,
+        State::Waiting,
+        State::Engaged,
+        State::Homing,
+        State::Done,
+        State::Passive,
+        State::Fault,
+        State::Shadow,
+    ];
+
     /// Lower-case English name, as logs and pages print it.
     #[must_use]
     pub const fn name(self) -> &'static str {

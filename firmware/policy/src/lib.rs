@@ -33,6 +33,7 @@ mod inference;
 pub mod native;
 pub mod schema;
 mod situation;
+mod timed;
 mod tokens;
 mod vantage;
 mod view;
@@ -48,6 +49,7 @@ pub use engine::{Engine, EngineKind, EngineNameError};
 pub use golden::{GOLDEN_TOLERANCE, Golden, SelfTestError, self_test};
 pub use inference::{Attention, Inference, Policy};
 pub use situation::{DeviceState, Preference, Situation};
+pub use timed::Timed;
 pub use tokens::{Slots, Tokens};
 pub use view::View;
 

@@ -1,48 +1,55 @@
-//! Byte streams to autopilots, radios and ground stations that never block: UDP, TCP and serial ports. And
-//! [`asked_to_end`], for the loops around them.
+//! Ports to autopilots, radios and ground stations that never block: UDP, TCP and serial.
 //!
-//! Host only: this crate opens sockets and devices for the programs. Nothing that flies decides here.
+//! For programs on a host. The crate moves bytes and decides nothing. [`end_requested`] reports the signals that
+//! ask a program to end.
 //!
 //! # Glossary
 //! - **endpoint**: the text that names a port, such as `udpin:0.0.0.0:14550`; see [`Endpoint`].
-//! - **frame**: what the caller hands to [`Port::send`] in one piece. A frame travels whole or not at all: one
-//!   datagram on UDP, never cut by a full buffer on TCP or serial.
-//! - **up / down**: whether bytes can travel now. A port that went down opens again by itself, see
+//! - **frame**: the argument of one [`Port::send`]. A frame is sent whole or not at all: one datagram on UDP, and
+//!   never cut by a full buffer on TCP or serial.
+//! - **peer**: the other side of a socket. [`Peers`] says which peers a listening UDP port serves.
+//! - **up / down**: whether the port can move bytes now. A port that went down opens again by itself, see
 //!   [`Port::maintain`].
 //!
-//! # When you may trust this
+//! # Guarantees
 //! - Only [`Port::open`] may block: it resolves the name and waits at most [`CONNECT_TIMEOUT`] for a TCP peer.
-//!   Everything else returns at once; [`wait`] is the one place to spend time.
-//! - An error at [`Port::open`] is the caller's mistake or a missing device, and is final. Whatever happens
-//!   later is a [`State`], never an error: it is said once by [`Port::maintain`] and mended if possible.
-//! - "Up" says that the operating system takes bytes, not that anybody hears them. On UDP it says nothing about
-//!   the peer: watch heartbeats.
-//! - Bytes arrive in any pieces and may be garbage; on UDP one call gives one datagram.
+//!   All other calls return at once. [`wait`] blocks by design.
+//! - An error from [`Port::open`] is final: a mistake of the caller or a missing device. A later fault is a
+//!   [`State`], never an error. [`Port::maintain`] reports it once and repairs it if it can.
+//! - "Up" means that the operating system accepts bytes. It does not mean that a peer receives them; on UDP only
+//!   a heartbeat shows that.
+//! - Bytes arrive in pieces of any size and may be damaged. On UDP one call returns one datagram.
 //!
-//! No clock is read here: [`Port::maintain`] takes `now`, and [`wait`] takes a span that the operating system
-//! measures.
-#![forbid(unsafe_code)]
+//! The crate reads no clock: [`Port::maintain`] takes `now`, and the operating system measures the time-out of
+//! [`wait`].
+#![deny(unsafe_code)]
 #![warn(missing_docs)]
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod devices;
 mod endpoint;
 mod outbox;
 mod port;
+mod port_error;
+mod resolver;
 mod retry;
 mod serial;
 mod signals;
+mod suggestion;
 mod tcp;
 mod transport;
 mod udp;
 
+pub use devices::{SerialDevice, serial_devices};
 pub use endpoint::{DEFAULT_BAUD, Endpoint, EndpointError, EndpointFault, SocketName};
 pub use outbox::OUTBOX_BYTES;
-pub use port::{Port, PortError, State, wait};
+pub use port::{Port, PortStats, State, wait};
+pub use port_error::PortError;
 pub use retry::{RETRY_FIRST, RETRY_LONGEST};
-pub use signals::asked_to_end;
+pub use signals::end_requested;
 pub use tcp::CONNECT_TIMEOUT;
-pub use transport::Down;
-pub use udp::MAX_PEERS;
+pub use transport::{Down, PEER_SILENCE};
+pub use udp::{MAX_PEERS, Peers};
 
-/// A receive buffer of this size takes any datagram that MAVLink routers send; a longer one is cut.
+/// A receive buffer of this size holds any datagram that MAVLink routers send. A longer datagram is cut.
 pub const RECEIVE_BYTES: usize = 4096;

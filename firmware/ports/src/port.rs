@@ -1,97 +1,101 @@
 //! A port of any kind, and waiting for several.
 
-use crate::endpoint::{Endpoint, SocketName};
+use crate::endpoint::Endpoint;
+use crate::port_error::PortError;
+use crate::resolver::{Resolver, resolve};
 use crate::retry::Retry;
 use crate::serial::Serial;
 use crate::tcp::{TcpIn, TcpOut};
 use crate::transport::{Down, Transport};
-use crate::udp::{UdpIn, UdpOut};
+use crate::udp::{Peers, UdpIn, UdpOut};
 use rustix::event::{PollFd, Timespec, poll};
 use std::io;
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// A port that could not be opened at the start: what, why, what to do.
-#[derive(Debug, thiserror::Error)]
-#[error("{endpoint}: {action}: {source}: {}", advice(.endpoint, .source))]
-pub struct PortError {
-    /// The endpoint asked for.
-    pub endpoint: Endpoint,
-    /// What failed.
-    pub action: &'static str,
-    /// Why.
-    pub source: io::Error,
-}
-
-fn advice(endpoint: &Endpoint, error: &io::Error) -> &'static str {
-    use io::ErrorKind::*;
-    let serial = matches!(endpoint, Endpoint::Serial { .. });
-    match error.kind() {
-        NotFound if serial => "plug the device in, or look for its name in /dev/serial/by-id",
-        PermissionDenied if serial => "add this user to the group that owns the device, often dialout",
-        WouldBlock if serial => "another program has the device open, stop it",
-        InvalidInput if serial => "the device does not know this baud rate, use another",
-        _ if serial => "check that this is a serial device",
-        PermissionDenied => "use a port number above 1023",
-        AddrInUse => "stop the other program that uses this port, or choose another number",
-        AddrNotAvailable => "use an address of this machine, or 0.0.0.0 for all of them",
-        ConnectionRefused | TimedOut => "start the other side first, or correct host and port",
-        _ => "correct host and port",
-    }
-}
-
-/// Whether bytes can travel.
+/// Whether a port can move bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
-    /// They can.
+    /// It can.
     Up,
-    /// They cannot, and why.
+    /// It cannot, and why.
     Down(Down),
+}
+
+/// Traffic of a port since it was opened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PortStats {
+    /// Bytes received.
+    pub bytes_in: u64,
+    /// Bytes of the frames that were handed to the system or queued.
+    pub bytes_out: u64,
+    /// Frames that were handed to the system or queued.
+    pub frames_out: u64,
+    /// Frames that were dropped: the port was down, or its peer too slow.
+    pub frames_dropped: u64,
+    /// Datagrams and connections refused because another peer holds the port.
+    pub refused: u64,
 }
 
 /// An open port.
 pub struct Port {
     endpoint: Endpoint,
     transport: Box<dyn Transport>,
-    /// Why it is down, meaningful while it is.
+    /// Why it is down; meaningful only while it is.
     reason: Down,
-    /// What [`Port::maintain`] said last.
-    told_up: bool,
+    /// The state that [`Port::maintain`] reported last.
+    reported_up: bool,
     retry: Retry,
-    dropped_frames: u64,
+    stats: PortStats,
 }
 
 impl Port {
-    /// Opens the port. The only call that may block, see the crate's page.
+    /// Opens the port. A listening UDP port answers all senders, see [`Peers::All`]. The only call that may block,
+    /// see the crate's page.
     ///
     /// # Errors
-    /// The name is unknown, the address taken, the device missing, the peer not there: [`PortError`] says what
-    /// to do.
+    /// The address is taken, the device missing, the peer not there. [`PortError`] says what to do. The name of a
+    /// host to connect or send to may be unknown: then the port is down until it gets an address.
     pub fn open(endpoint: &Endpoint) -> Result<Port, PortError> {
+        Port::open_for(endpoint, Peers::All)
+    }
+
+    /// Like [`Port::open`], with a rule for the peers of a listening UDP port. Other kinds ignore the rule.
+    ///
+    /// # Errors
+    /// As [`Port::open`].
+    pub fn open_for(endpoint: &Endpoint, peers: Peers) -> Result<Port, PortError> {
         let fail = |action| move |source| PortError { endpoint: endpoint.clone(), action, source };
-        let resolve = |name: &SocketName| resolve(name).map_err(fail("cannot find the host"));
+        let resolve = |name| resolve(name).map_err(fail("cannot find the host"));
         let transport: Box<dyn Transport> = match endpoint {
-            Endpoint::UdpIn(name) => Box::new(UdpIn::open(&resolve(name)?).map_err(fail("cannot listen"))?),
-            Endpoint::UdpOut(name) => {
-                Box::new(UdpOut::open(&resolve(name)?).map_err(fail("cannot send there"))?)
+            Endpoint::UdpIn(name) => {
+                Box::new(UdpIn::open(&resolve(name)?, peers).map_err(fail("cannot listen"))?)
+            }
+            Endpoint::UdpOut(name) | Endpoint::UdpBroadcast(name) => {
+                let broadcast = matches!(endpoint, Endpoint::UdpBroadcast(_));
+                let resolver = Resolver::new(name.clone());
+                Box::new(UdpOut::open(resolver, broadcast).map_err(fail("cannot send there"))?)
             }
             Endpoint::TcpIn(name) => Box::new(TcpIn::open(&resolve(name)?).map_err(fail("cannot listen"))?),
-            Endpoint::TcpOut(name) => Box::new(TcpOut::open(resolve(name)?).map_err(fail("cannot connect"))?),
+            Endpoint::TcpOut(name) => {
+                Box::new(TcpOut::open(Resolver::new(name.clone())).map_err(fail("cannot connect"))?)
+            }
             Endpoint::Serial { path, baud } => {
                 Box::new(Serial::open(path.clone(), *baud).map_err(fail("cannot open the device"))?)
             }
         };
+        let listens = matches!(endpoint, Endpoint::TcpIn(_));
         Ok(Port {
             endpoint: endpoint.clone(),
-            told_up: transport.is_up(),
+            reported_up: transport.is_up(),
             transport,
-            reason: Down::NoPeer,
+            reason: if listens { Down::NoPeer } else { Down::Unresolved },
             retry: Retry::new(),
-            dropped_frames: 0,
+            stats: PortStats::default(),
         })
     }
 
-    /// What was opened.
+    /// The endpoint that was opened.
     #[must_use]
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
@@ -103,42 +107,80 @@ impl Port {
         self.transport.local_address()
     }
 
-    /// Whether bytes can travel now.
+    /// Whether the port can move bytes now.
     #[must_use]
     pub fn state(&self) -> State {
         if self.transport.is_up() { State::Up } else { State::Down(self.reason) }
     }
 
-    /// Frames that did not leave: the port was down, or the other side too slow.
+    /// The traffic so far.
     #[must_use]
-    pub fn dropped_frames(&self) -> u64 {
-        self.dropped_frames
+    pub fn stats(&self) -> PortStats {
+        PortStats { refused: self.transport.refused(), ..self.stats }
     }
 
-    /// Reads into `buffer`, at most one datagram; 0 means nothing now, for whatever reason. Call until it
-    /// gives 0: only then may [`wait`] be trusted to wake for the next byte. [`crate::RECEIVE_BYTES`] is a good
-    /// buffer.
+    /// Reads into `buffer`, at most one datagram. 0 means that nothing has arrived, or that the port is down. Call
+    /// until it returns 0: only then does [`wait`] wake for the next byte. [`crate::RECEIVE_BYTES`] is a good
+    /// size.
     pub fn receive(&mut self, buffer: &mut [u8]) -> usize {
         let received = self.transport.receive(buffer);
-        received.unwrap_or_else(|reason| {
+        let bytes = received.unwrap_or_else(|reason| {
             self.reason = reason;
             0
-        })
+        });
+        self.stats.bytes_in = self.stats.bytes_in.saturating_add(bytes as u64);
+        bytes
     }
 
-    /// Sends one whole frame, best effort: a frame that cannot leave now and has no room to wait is dropped and
-    /// counted. A listening UDP port sends it to every peer heard; to nobody when nobody has spoken.
+    /// Accepts the sender of the last datagram as the peer of a port opened with [`Peers::Bound`], or notes that
+    /// the peer is still there. The caller has found a valid frame of an allowed sender in the datagram.
+    pub fn confirm_peer(&mut self) {
+        self.transport.confirm_peer();
+    }
+
+    /// Sends one whole frame, best effort: a frame that cannot leave now and finds no room in the queue is dropped
+    /// and counted. A listening UDP port sends it to every peer, and to no one while it has none.
     pub fn send(&mut self, frame: &[u8]) {
-        let sent = self.transport.send(frame).unwrap_or_else(|reason| {
+        let sent = self.transport.send(frame, false);
+        self.count(frame, sent);
+    }
+
+    /// Like [`Port::send`], for a frame that [`Port::revoke`] takes back as long as it waits in the queue.
+    pub fn send_revocable(&mut self, frame: &[u8]) {
+        let sent = self.transport.send(frame, true);
+        self.count(frame, sent);
+    }
+
+    /// Sends one frame to the sender of the last datagram, whether or not it is a peer: the acknowledgement of a
+    /// protocol that wants one. On other ports the same as [`Port::send`].
+    pub fn reply(&mut self, frame: &[u8]) {
+        let sent = self.transport.reply(frame);
+        self.count(frame, sent);
+    }
+
+    fn count(&mut self, frame: &[u8], sent: Result<bool, Down>) {
+        let sent = sent.unwrap_or_else(|reason| {
             self.reason = reason;
             false
         });
-        self.dropped_frames += u64::from(!sent);
+        if sent {
+            self.stats.frames_out = self.stats.frames_out.saturating_add(1);
+            self.stats.bytes_out = self.stats.bytes_out.saturating_add(frame.len() as u64);
+        } else {
+            self.stats.frames_dropped = self.stats.frames_dropped.saturating_add(1);
+        }
     }
 
-    /// Opens a lost port again when its time has come, and says once that it went down or came back. Call it
+    /// Drops all queued frames that were sent with [`Port::send_revocable`]; returns how many. On a serial port
+    /// the untransmitted bytes in the kernel are dropped as well.
+    pub fn revoke(&mut self) -> usize {
+        self.transport.revoke()
+    }
+
+    /// Opens a lost port again when its time has come, and reports once that it went down or came back. Call it
     /// some times a second.
     pub fn maintain(&mut self, now: Instant) -> Option<State> {
+        self.transport.pass_time(now);
         if self.transport.is_up() {
             self.retry.reset();
         } else if self.retry.is_due(now)
@@ -147,20 +189,15 @@ impl Port {
             self.reason = reason;
         }
         let up = self.transport.is_up();
-        (up != std::mem::replace(&mut self.told_up, up)).then(|| self.state())
+        (up != std::mem::replace(&mut self.reported_up, up)).then(|| self.state())
     }
 }
 
-fn resolve(name: &SocketName) -> io::Result<Vec<SocketAddr>> {
-    let addresses: Vec<SocketAddr> = name.to_string().to_socket_addrs()?.collect();
-    if addresses.is_empty() { Err(io::ErrorKind::NotFound.into()) } else { Ok(addresses) }
-}
-
-/// Sleeps until one of the ports has something to [`Port::receive`] or `timeout` has passed; says whether one
-/// has. A signal ends the wait early. Nothing is consumed, and no processor time spent.
+/// Sleeps until one of the ports has something to [`Port::receive`] or `timeout` has passed; returns whether one
+/// has. A signal ends the wait early. The call reads nothing.
 ///
 /// # Errors
-/// The operating system cannot wait; treat it as fatal.
+/// The operating system cannot wait.
 pub fn wait(ports: &[&Port], timeout: Duration) -> io::Result<bool> {
     let mut watched: Vec<PollFd<'_>> = Vec::with_capacity(2 * ports.len());
     for port in ports {

@@ -1,13 +1,13 @@
-//! When to try again.
+//! Back-off between attempts to open a lost port.
 
 use std::time::{Duration, Instant};
 
-/// A lost port is opened again after this long at first.
+/// Wait before the first attempt to open a lost port again.
 pub const RETRY_FIRST: Duration = Duration::from_millis(250);
-/// Each failure doubles the wait, up to this.
+/// Longest wait: each failure doubles it up to here.
 pub const RETRY_LONGEST: Duration = Duration::from_secs(4);
 
-/// Doubling waits between attempts.
+/// Waits that double with each attempt.
 #[derive(Debug)]
 pub(crate) struct Retry {
     delay: Duration,

@@ -6,26 +6,26 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A flag that is raised when the operating system asks this program to end: SIGINT, SIGTERM, or SIGHUP, which comes
-/// when the terminal is closed.
+/// A flag that becomes true when the operating system asks this program to end: by SIGINT, SIGTERM, or SIGHUP, which
+/// is sent when the terminal is closed.
 ///
-/// What was ignored when the program was started stays ignored: hangups under `nohup`, interrupts of a script's
-/// background.
+/// A signal that was ignored when the program started stays ignored: hangups under `nohup`, interrupts of a
+/// background job in a script.
 ///
 /// # Errors
 /// The system refuses a handler.
-pub fn asked_to_end() -> io::Result<Arc<AtomicBool>> {
-    let asked = Arc::new(AtomicBool::new(false));
+pub fn end_requested() -> io::Result<Arc<AtomicBool>> {
+    let requested = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM, SIGHUP] {
         if !is_ignored(signal) {
-            flag::register(signal, Arc::clone(&asked))?;
+            flag::register(signal, Arc::clone(&requested))?;
         }
     }
-    Ok(asked)
+    Ok(requested)
 }
 
-/// From `/proc/self/status` (proc(5)): a mask in hexadecimal, the lowest bit for signal 1. Without it nothing is taken
-/// for ignored.
+/// From `/proc/self/status` (proc(5)): a hexadecimal mask with the lowest bit for signal 1. Without that file no
+/// signal counts as ignored.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

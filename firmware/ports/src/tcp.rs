@@ -1,17 +1,20 @@
-//! Connections.
+//! TCP connections.
 
 use crate::outbox::Outbox;
-use crate::transport::{Down, Transport};
+use crate::resolver::Resolver;
+use crate::transport::{Down, PEER_SILENCE, Transport};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::net::{AddressFamily, SocketFlags, SocketType, connect, ipproto, socket_with, sockopt};
+use socket2::{Domain, Protocol, Socket, Type};
 use std::io::{self, Read};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How long [`crate::Port::open`] waits for a TCP peer to answer.
 pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+/// Connections that the system keeps for [`TcpIn`] until they are accepted.
+const BACKLOG: i32 = 8;
 
-/// An established connection and what it did not take yet.
+/// An established connection and the bytes that it has not accepted yet.
 struct Peer {
     stream: TcpStream,
     outbox: Outbox,
@@ -20,7 +23,7 @@ struct Peer {
 impl Peer {
     fn new(stream: TcpStream) -> io::Result<Peer> {
         stream.set_nonblocking(true)?;
-        // Setpoints are small and must not wait for company.
+        // Setpoints are small; they must not wait until a segment is full.
         stream.set_nodelay(true)?;
         Ok(Peer { stream, outbox: Outbox::default() })
     }
@@ -30,8 +33,8 @@ impl Peer {
         read_now(&mut self.stream, buffer)
     }
 
-    fn send(&mut self, frame: &[u8]) -> Result<bool, Down> {
-        Ok(self.outbox.send(frame, &mut self.stream)?)
+    fn send(&mut self, frame: &[u8], revocable: bool) -> Result<bool, Down> {
+        Ok(self.outbox.send(frame, revocable, &mut self.stream)?)
     }
 
     fn watch<'a>(&'a self, watched: &mut Vec<PollFd<'a>>) {
@@ -40,7 +43,7 @@ impl Peer {
     }
 }
 
-/// Reads what is there; the end of the stream is a peer that is gone.
+/// Reads what has arrived. The end of the stream means that the peer is gone.
 pub(crate) fn read_now(stream: &mut impl Read, buffer: &mut [u8]) -> Result<usize, Down> {
     if buffer.is_empty() {
         return Ok(0);
@@ -60,20 +63,41 @@ pub(crate) fn read_now(stream: &mut impl Read, buffer: &mut [u8]) -> Result<usiz
 pub(crate) struct TcpIn {
     listener: TcpListener,
     peer: Option<Peer>,
+    /// Whether the peer has sent bytes since time passed last.
+    heard: bool,
+    /// When the peer sent bytes last, as far as time has passed.
+    heard_at: Option<Instant>,
+    /// The peer has been silent for [`PEER_SILENCE`].
+    silent: bool,
+    refused: u64,
 }
 
 impl TcpIn {
     pub(crate) fn open(addresses: &[SocketAddr]) -> io::Result<TcpIn> {
-        let listener = TcpListener::bind(addresses)?;
-        listener.set_nonblocking(true)?;
-        Ok(TcpIn { listener, peer: None })
+        let listener = first(addresses, |address| {
+            let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
+            if address.is_ipv6() {
+                // [::] listens on IPv4 as well, whatever the system's default is.
+                socket.set_only_v6(false)?;
+            }
+            // Without this a restart finds the port in use until old connections have timed out.
+            socket.set_reuse_address(true)?;
+            socket.bind(&address.into())?;
+            socket.listen(BACKLOG)?;
+            socket.set_nonblocking(true)?;
+            Ok(TcpListener::from(socket))
+        })?;
+        Ok(TcpIn { listener, peer: None, heard: false, heard_at: None, silent: false, refused: 0 })
     }
 
-    /// The newest connection wins: a client that was restarted must not wait for its own ghost.
+    /// A new connection does not replace one that is alive. A client that lost its connection without closing it
+    /// gets in once the old one has been silent for [`PEER_SILENCE`].
     fn accept(&mut self) {
         while let Ok((stream, _)) = self.listener.accept() {
-            if let Ok(peer) = Peer::new(stream) {
-                self.peer = Some(peer);
+            if self.peer.is_some() && !self.silent {
+                self.refused = self.refused.saturating_add(1);
+            } else if let Ok(peer) = Peer::new(stream) {
+                (self.peer, self.heard, self.heard_at, self.silent) = (Some(peer), true, None, false);
             }
         }
     }
@@ -90,16 +114,37 @@ impl Transport for TcpIn {
     }
 
     fn receive(&mut self, buffer: &mut [u8]) -> Result<usize, Down> {
+        // The peer first: its end frees the place for a connection that waits.
+        let received = self.with_peer(0, |peer| peer.receive(buffer));
+        if received.is_ok_and(|bytes| bytes > 0) {
+            (self.heard, self.silent) = (true, false);
+        }
         self.accept();
-        self.with_peer(0, |peer| peer.receive(buffer))
+        received
     }
 
-    fn send(&mut self, frame: &[u8]) -> Result<bool, Down> {
-        self.with_peer(false, |peer| peer.send(frame))
+    fn send(&mut self, frame: &[u8], revocable: bool) -> Result<bool, Down> {
+        self.with_peer(false, |peer| peer.send(frame, revocable))
+    }
+
+    fn revoke(&mut self) -> usize {
+        self.peer.as_mut().map_or(0, |peer| peer.outbox.revoke())
     }
 
     fn reopen(&mut self) -> Result<(), Down> {
         Ok(())
+    }
+
+    fn pass_time(&mut self, now: Instant) {
+        if std::mem::take(&mut self.heard) {
+            self.heard_at = Some(now);
+        }
+        let since = self.heard_at.map(|at| now.saturating_duration_since(at));
+        self.silent = since.is_some_and(|since| since >= PEER_SILENCE);
+    }
+
+    fn refused(&self) -> u64 {
+        self.refused
     }
 
     fn local_address(&self) -> Option<SocketAddr> {
@@ -114,11 +159,26 @@ impl Transport for TcpIn {
     }
 }
 
-/// Connects, and again.
+/// Tries the addresses in order; the error of the last one if none works.
+pub(crate) fn first<T>(
+    addresses: &[SocketAddr],
+    mut open: impl FnMut(SocketAddr) -> io::Result<T>,
+) -> io::Result<T> {
+    let mut last = io::Error::from(io::ErrorKind::NotFound);
+    for &address in addresses {
+        match open(address) {
+            Ok(opened) => return Ok(opened),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+/// Connects, and connects again.
 pub(crate) struct TcpOut {
-    addresses: Vec<SocketAddr>,
-    /// Which address the next attempt takes.
-    attempt: usize,
+    resolver: Resolver,
+    /// Number of attempts so far; each takes the next address.
+    attempts: usize,
     connection: Connection,
 }
 
@@ -130,17 +190,13 @@ enum Connection {
 }
 
 impl TcpOut {
-    pub(crate) fn open(addresses: Vec<SocketAddr>) -> io::Result<TcpOut> {
-        let mut last = io::Error::from(io::ErrorKind::NotFound);
-        for address in &addresses {
-            match TcpStream::connect_timeout(address, CONNECT_TIMEOUT).and_then(Peer::new) {
-                Ok(peer) => {
-                    return Ok(TcpOut { addresses, attempt: 0, connection: Connection::Established(peer) });
-                }
-                Err(error) => last = error,
-            }
-        }
-        Err(last)
+    pub(crate) fn open(resolver: Resolver) -> io::Result<TcpOut> {
+        let connect = |address| TcpStream::connect_timeout(&address, CONNECT_TIMEOUT).and_then(Peer::new);
+        let connection = match resolver.addresses() {
+            [] => Connection::None,
+            addresses => Connection::Established(first(addresses, connect)?),
+        };
+        Ok(TcpOut { resolver, attempts: 0, connection })
     }
 
     fn settle(&mut self) -> Result<(), Down> {
@@ -163,16 +219,19 @@ impl TcpOut {
 
 /// Starts a handshake without waiting for it.
 fn begin_connect(address: SocketAddr) -> io::Result<TcpStream> {
-    let family = if address.is_ipv4() { AddressFamily::INET } else { AddressFamily::INET6 };
-    let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
-    let socket = socket_with(family, SocketType::STREAM, flags, Some(ipproto::TCP))?;
-    match connect(&socket, &address) {
-        Ok(()) | Err(rustix::io::Errno::INPROGRESS) => {}
-        Err(error) => return Err(error.into()),
+    let socket = Socket::new(Domain::for_address(address), Type::STREAM, Some(Protocol::TCP))?;
+    socket.set_nonblocking(true)?;
+    let under_way = Some(rustix::io::Errno::INPROGRESS.raw_os_error());
+    if let Err(error) = socket.connect(&address.into())
+        && error.raw_os_error() != under_way
+    {
+        return Err(error);
     }
-    // Reads and clears an error that is already known, such as a refusal on loopback.
-    sockopt::socket_error(&socket)??;
-    Ok(TcpStream::from(socket))
+    // An error that is known already, such as a refusal on loopback.
+    match socket.take_error()? {
+        Some(error) => Err(error),
+        None => Ok(TcpStream::from(socket)),
+    }
 }
 
 impl Transport for TcpOut {
@@ -186,17 +245,29 @@ impl Transport for TcpOut {
         peer.receive(buffer).inspect_err(|_| self.connection = Connection::None)
     }
 
-    fn send(&mut self, frame: &[u8]) -> Result<bool, Down> {
+    fn send(&mut self, frame: &[u8], revocable: bool) -> Result<bool, Down> {
         let Connection::Established(peer) = &mut self.connection else { return Ok(false) };
-        peer.send(frame).inspect_err(|_| self.connection = Connection::None)
+        peer.send(frame, revocable).inspect_err(|_| self.connection = Connection::None)
     }
 
+    fn revoke(&mut self) -> usize {
+        match &mut self.connection {
+            Connection::Established(peer) => peer.outbox.revoke(),
+            Connection::None | Connection::Pending(_) => 0,
+        }
+    }
+
+    /// Connects to the next known address, and looks the name up for the attempt after this one: the host may have
+    /// another address by then.
     fn reopen(&mut self) -> Result<(), Down> {
-        let Some(&address) = self.addresses.get(self.attempt % self.addresses.len().max(1)) else {
-            return Ok(());
-        };
-        self.attempt += 1;
+        self.resolver.settle();
+        self.resolver.refresh();
         self.connection = Connection::None;
+        let addresses = self.resolver.addresses();
+        let Some(&address) = addresses.get(self.attempts % addresses.len().max(1)) else {
+            return Err(Down::Unresolved);
+        };
+        self.attempts += 1;
         self.connection = Connection::Pending(begin_connect(address)?);
         self.settle()
     }

@@ -1,9 +1,9 @@
 //! Ports against plain sockets on loopback. Nothing sleeps: every wait is for an event, with a deadline that only
-//! a failing test reaches.
+//! a failing test reaches. Peers are in `peers.rs`.
 
 use gleaner_ports::{Down, Endpoint, Port, RETRY_LONGEST, State, wait};
 use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{TcpListener, TcpStream, UdpSocket};
 use std::time::{Duration, Instant};
 
 const DEADLINE: Duration = Duration::from_secs(20);
@@ -12,7 +12,7 @@ fn open(text: &str) -> Port {
     Port::open(&text.parse::<Endpoint>().unwrap()).unwrap()
 }
 
-/// Reads until `bytes` bytes have come.
+/// Reads until `bytes` bytes have arrived.
 fn receive(port: &mut Port, bytes: usize) -> Vec<u8> {
     let mut received = Vec::new();
     while received.len() < bytes {
@@ -20,13 +20,13 @@ fn receive(port: &mut Port, bytes: usize) -> Vec<u8> {
         let now = port.receive(&mut buffer);
         received.extend(&buffer[..now]);
         if now == 0 {
-            assert!(wait(&[port], DEADLINE).unwrap(), "only {received:?} came");
+            assert!(wait(&[port], DEADLINE).unwrap(), "only {received:?} arrived");
         }
     }
     received
 }
 
-/// Works the port until it says something.
+/// Works the port until it reports a change of state.
 fn next_state(port: &mut Port, now: Instant) -> State {
     loop {
         port.receive(&mut [0; 16]);
@@ -44,10 +44,10 @@ fn accept(listener: &TcpListener) -> TcpStream {
 }
 
 #[test]
-fn a_listening_udp_port_answers_everybody_who_has_spoken() {
+fn a_listening_udp_port_answers_all_senders() {
     let mut port = open("udpin:127.0.0.1:0");
-    port.send(b"nobody hears this");
-    assert_eq!((port.dropped_frames(), port.receive(&mut [0; 16])), (0, 0));
+    port.send(b"no peer yet");
+    assert_eq!((port.stats().frames_dropped, port.receive(&mut [0; 16])), (0, 0));
     let peers: Vec<UdpSocket> = (0..2)
         .map(|_| {
             let peer = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -70,13 +70,13 @@ fn a_listening_udp_port_answers_everybody_who_has_spoken() {
 }
 
 #[test]
-fn a_speaking_udp_port_outlives_a_peer_that_is_not_there_yet() {
+fn a_sending_udp_port_survives_refused_datagrams() {
     let address = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let mut port = open(&format!("udpout:{address}"));
     port.send(b"refused");
-    assert!(wait(&[&port], DEADLINE).unwrap(), "the refusal wakes us");
+    assert!(wait(&[&port], DEADLINE).unwrap(), "the refusal ends the wait");
     assert_eq!(port.receive(&mut [0; 16]), 0);
-    assert!(!wait(&[&port], Duration::ZERO).unwrap(), "and does not wake us again");
+    assert!(!wait(&[&port], Duration::ZERO).unwrap(), "and does not end the next one");
     assert_eq!((port.maintain(Instant::now()), port.state()), (None, State::Up));
     let peer = UdpSocket::bind(address).unwrap();
     port.send(b"heard");
@@ -88,35 +88,7 @@ fn a_speaking_udp_port_outlives_a_peer_that_is_not_there_yet() {
 }
 
 #[test]
-fn a_listening_tcp_port_notices_the_end_and_takes_the_newest_peer() {
-    let mut port = open("tcpin:127.0.0.1:0");
-    let now = Instant::now();
-    assert_eq!(port.state(), State::Down(Down::NoPeer));
-    port.send(b"dropped");
-    assert_eq!(port.dropped_frames(), 1);
-
-    let address: SocketAddr = port.local_address().unwrap();
-    let mut first = TcpStream::connect(address).unwrap();
-    assert_eq!(next_state(&mut port, now), State::Up);
-    first.write_all(b"one").unwrap();
-    assert_eq!(receive(&mut port, 3), b"one");
-
-    let mut second = TcpStream::connect(address).unwrap();
-    second.write_all(b"two").unwrap();
-    assert_eq!(receive(&mut port, 3), b"two");
-    port.send(b"to the second");
-    let mut buffer = [0; 13];
-    second.read_exact(&mut buffer).unwrap();
-    assert_eq!(&buffer, b"to the second");
-    assert_eq!(first.read(&mut buffer).unwrap(), 0, "the first was let go");
-
-    drop(second);
-    assert_eq!(next_state(&mut port, now), State::Down(Down::Gone));
-    assert_eq!(port.maintain(now), None, "said once");
-}
-
-#[test]
-fn a_connecting_tcp_port_comes_back_when_its_peer_does() {
+fn a_connecting_tcp_port_reconnects() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let mut port = open(&format!("tcpout:{}", listener.local_addr().unwrap()));
     let mut peer = accept(&listener);
@@ -136,7 +108,7 @@ fn a_connecting_tcp_port_comes_back_when_its_peer_does() {
 }
 
 #[test]
-fn refused_attempts_to_connect_again_are_not_said_again() {
+fn failed_attempts_to_reconnect_are_not_reported_again() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     let mut port = open(&format!("tcpout:{address}"));
@@ -166,7 +138,7 @@ fn next_state_from_attempt(port: &mut Port, now: Instant) -> State {
 }
 
 #[test]
-fn a_slow_tcp_peer_gets_whole_frames_and_the_rest_is_counted() {
+fn a_slow_tcp_peer_gets_whole_frames() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let mut port = open(&format!("tcpout:{}", listener.local_addr().unwrap()));
     let mut peer = accept(&listener);
@@ -176,14 +148,14 @@ fn a_slow_tcp_peer_gets_whole_frames_and_the_rest_is_counted() {
         frame
     };
     let mut offered = 0;
-    while port.dropped_frames() < 10 {
+    while port.stats().frames_dropped < 10 {
         port.send(&frame(offered));
         offered += 1;
     }
     let mut buffer = [0; 280];
     let mut last = None;
     for _ in 0..offered - 10 {
-        // What waits leaves when the port is worked again.
+        // Queued frames leave when the port is read.
         port.receive(&mut [0; 16]);
         peer.read_exact(&mut buffer).unwrap();
         let index = u32::from_le_bytes(buffer[..4].try_into().unwrap());
@@ -195,7 +167,7 @@ fn a_slow_tcp_peer_gets_whole_frames_and_the_rest_is_counted() {
 }
 
 #[test]
-fn waiting_for_several_ports_wakes_for_any() {
+fn a_wait_for_several_ports_ends_for_any() {
     let silent = open("tcpin:127.0.0.1:0");
     let mut spoken = open("udpin:127.0.0.1:0");
     assert!(!wait(&[&silent, &spoken], Duration::ZERO).unwrap());
@@ -208,18 +180,56 @@ fn waiting_for_several_ports_wakes_for_any() {
 }
 
 #[test]
-fn what_cannot_be_opened_says_what_to_do() {
+fn open_errors_say_what_to_do() {
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let busy = format!("udpin:{}", taken.local_addr().unwrap());
-    let nobody = format!("tcpout:{closed}");
+    let closed = format!("tcpout:{closed}");
     for (text, expected) in [
         (busy.as_str(), "stop the other program that uses this port, or choose another number"),
-        (nobody.as_str(), "start the other side first, or correct host and port"),
+        (closed.as_str(), "start the other side first, or correct host and port"),
         ("udpin:192.0.2.1:14550", "use an address of this machine, or 0.0.0.0 for all of them"),
     ] {
         let error = Port::open(&text.parse().unwrap()).err().unwrap().to_string();
         assert!(error.starts_with(text) && error.ends_with(expected), "{error}");
         assert_eq!(error.lines().count(), 1, "{error}");
     }
+}
+
+#[test]
+fn a_dual_stack_port_receives_ipv4_and_ipv6() {
+    let mut port = open("udpin:[::]:0");
+    let number = port.local_address().unwrap().port();
+    for (own, to) in [("127.0.0.1:0", format!("127.0.0.1:{number}")), ("[::1]:0", format!("[::1]:{number}"))]
+    {
+        UdpSocket::bind(own).unwrap().send_to(b"hello", to).unwrap();
+        assert_eq!(receive(&mut port, 5), b"hello");
+    }
+}
+
+#[test]
+fn an_unknown_host_is_down_until_it_gets_an_address() {
+    for kind in ["udpout", "tcpout"] {
+        let mut port = open(&format!("{kind}:no-such-host.invalid:5760"));
+        assert_eq!(port.state(), State::Down(Down::Unresolved));
+        port.send(b"dropped");
+        assert_eq!(port.stats().frames_dropped, 1);
+        let start = Instant::now();
+        assert_eq!(port.maintain(start), None);
+        assert_eq!(port.maintain(start + RETRY_LONGEST), None, "still no address");
+        assert_eq!(port.state(), State::Down(Down::Unresolved));
+    }
+}
+
+#[test]
+fn a_broadcast_port_receives_answers_of_single_hosts() {
+    let peer = UdpSocket::bind("0.0.0.0:0").unwrap();
+    peer.set_read_timeout(Some(DEADLINE)).unwrap();
+    let mut port = open(&format!("udpbcast:127.255.255.255:{}", peer.local_addr().unwrap().port()));
+    port.send(b"to all");
+    let mut buffer = [0; 16];
+    let (bytes, from) = peer.recv_from(&mut buffer).unwrap();
+    assert_eq!(&buffer[..bytes], b"to all");
+    peer.send_to(b"answer", from).unwrap();
+    assert_eq!(receive(&mut port, 1), b"answer");
 }

@@ -1,11 +1,10 @@
 //! What happened: the track, the slots, the frames; and their files.
 
 use crate::autopilot::Truth;
-use gleaner_pilot::{DecisionRecord, Mission};
+use gleaner_pilot::{DecisionRecord, LoggedDecision, Mission, SimulatedSlot};
 use gleaner_policy::{DeviceState, Preference, Situation, Slots, Tokens};
 use gleaner_units::{Duration, Instant, Ned, Rays};
 use gleaner_world::{City, Serving};
-use serde::Serialize;
 use std::io::{self, Write};
 
 /// One decision that passed by on the wire.
@@ -64,9 +63,8 @@ pub struct Journal {
     next_point: Instant,
 }
 
-/// The clock of a telemetry log counts from 1970; a virtual flight begins on 2026-01-01, so that equal flights give
-/// equal files.
-const LOG_EPOCH_US: u64 = 1_767_225_600_000_000;
+/// The clock of a log counts from 1970. A virtual flight begins on 2026-01-01, so that equal flights give equal files.
+const LOG_EPOCH_S: u64 = 1_767_225_600;
 
 impl Journal {
     const TRACK_INTERVAL: Duration = Duration::from_millis(200);
@@ -110,67 +108,33 @@ impl Journal {
     /// Those of the writer.
     pub fn write_tlog(&self, out: &mut impl Write) -> io::Result<()> {
         for (at, frame) in &self.frames {
-            out.write_all(&(LOG_EPOCH_US + at.as_micros()).to_be_bytes())?;
+            out.write_all(&(LOG_EPOCH_S * 1_000_000 + at.as_micros()).to_be_bytes())?;
             out.write_all(frame)?;
         }
         Ok(())
     }
 
-    /// Writes one JSON object per decision.
+    /// Writes one JSON object per decision, as `gleaner run` does: `gleaner replay` reads both. The model's input is
+    /// built again from the records and `mission`; a record with an impossible preference has none and is left out.
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn write_decisions(&self, out: &mut impl Write) -> io::Result<()> {
+    pub fn write_decisions(&self, mission: &Mission, out: &mut impl Write) -> io::Result<()> {
         for slot in &self.slots {
-            serde_json::to_writer(&mut *out, &Line::new(slot))?;
+            let Some((tokens, slots)) = slot.observation(mission) else { continue };
+            let line = LoggedDecision {
+                time_us: slot.at.as_micros(),
+                position_ned_m: Some([slot.position.north_m, slot.position.east_m, slot.position.down_m]),
+                truth: Some(SimulatedSlot {
+                    served: slot.serving.map(|serving| serving.device),
+                    served_units: slot.serving.map_or(0.0, |serving| serving.collected_units),
+                    collected_after: slot.collected,
+                }),
+                ..LoggedDecision::from_record(LOG_EPOCH_S, &slot.record, tokens, slots)
+            };
+            serde_json::to_writer(&mut *out, &line)?;
             out.write_all(b"\n")?;
         }
         Ok(())
-    }
-}
-
-/// One line of `decisions.jsonl`. The names are those of the companion's log; what only a simulation can know comes
-/// last.
-#[derive(Serialize)]
-struct Line {
-    sequence: u32,
-    time_us: u64,
-    state: &'static str,
-    cell: [i16; 2],
-    action: &'static str,
-    mask: Vec<&'static str>,
-    battery: f32,
-    spare: f32,
-    w_data: f32,
-    collected: f32,
-    logits: Option<[f32; 5]>,
-    attended: Option<u16>,
-    position_ned_m: [f32; 3],
-    served: Option<usize>,
-    served_units: f32,
-    collected_after: f32,
-}
-
-impl Line {
-    fn new(slot: &Slot) -> Line {
-        let record = &slot.record;
-        Line {
-            sequence: record.sequence,
-            time_us: slot.at.as_micros(),
-            state: record.state.name(),
-            cell: [record.cell.x, record.cell.y],
-            action: record.action.name(),
-            mask: record.mask.iter().map(|action| action.name()).collect(),
-            battery: record.battery.0,
-            spare: record.spare.0,
-            w_data: record.w_data,
-            collected: record.collected,
-            logits: record.logits,
-            attended: record.attended,
-            position_ned_m: [slot.position.north_m, slot.position.east_m, slot.position.down_m],
-            served: slot.serving.map(|serving| serving.device),
-            served_units: slot.serving.map_or(0.0, |serving| serving.collected_units),
-            collected_after: slot.collected,
-        }
     }
 }

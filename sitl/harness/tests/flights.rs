@@ -332,7 +332,11 @@ fn the_same_seed_gives_the_same_bytes() {
         let flown = flown(plan, Wishes { switches, ..Wishes::plain(0.9) }, Waiter);
         let (mut tlog, mut decisions) = (Vec::new(), Vec::new());
         flown.simulation.journal().write_tlog(&mut tlog).unwrap();
-        flown.simulation.journal().write_decisions(&mut decisions).unwrap();
+        flown
+            .simulation
+            .journal()
+            .write_decisions(&flown.simulation.staged().mission, &mut decisions)
+            .unwrap();
         (tlog, decisions)
     };
     let (first, second) = (files(), files());

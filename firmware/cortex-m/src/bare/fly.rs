@@ -2,14 +2,14 @@
 
 use super::log::Defmt;
 use super::{fault, flash, lines, now};
-use crate::{Cause, Keeper, LastWords, ResetFlags, Runtime, Timed};
+use crate::{Cause, Keeper, LastWords, ResetFlags, Runtime};
 use core::fmt;
 use core::mem::MaybeUninit;
 use embedded_storage::nor_flash::NorFlash;
 use gleaner_link::Severity;
 use gleaner_pilot::{Onboard, Parameters, Settings, State, mission_image};
 use gleaner_policy::native::{BlobError, Model, NativePolicy, Workspace};
-use gleaner_policy::{Inference, Policy, SelfTestError, Tokens, self_test};
+use gleaner_policy::{Inference, Policy, SelfTestError, Timed, Tokens, self_test};
 use heapless::Vec;
 use static_cell::{ConstStaticCell, StaticCell};
 

@@ -26,7 +26,7 @@ pub(super) fn serve(order: &ServeOrder) -> Result<bool, ProgramError> {
         write_mission(&staged, path)?;
     }
     let mut server = Server::open(order, staged)?;
-    let stop = gleaner_ports::asked_to_end().map_err(ProgramError::Signals)?;
+    let stop = gleaner_ports::end_requested().map_err(ProgramError::Signals)?;
     server.introduce(order)?;
     let finished = server.run(order, &stop)?;
     server.report(order, finished, begun)
