@@ -1,4 +1,4 @@
-//! Puts the memory map and the mission where linker and compiler find them. Does nothing for a host.
+//! Prepares the linker script and the mission image for a board. Does nothing on a host.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -12,16 +12,16 @@ mod board {
     use std::path::{Path, PathBuf};
     use std::{env, fs};
 
-    /// The mission of an image that is built without `GLEANER_MISSION`.
+    /// The mission used without `GLEANER_MISSION`.
     const EXAMPLE: &str = "../companion/dist/mission.toml";
 
-    /// The panic handler stands in a section of its own, which is empty when nothing can reach it.
-    const NO_PANIC: &str = "ASSERT(SIZEOF(.gleaner_panic) == 0, \"a panic is left in the image: \
-        build with GLEANER_ALLOW_PANIC=1, then firmware/cortex-m/panics.sh IMAGE names its callers\")\n";
+    /// The panic handler has a section of its own, which is empty when no panic is reachable.
+    const NO_PANIC: &str = "ASSERT(SIZEOF(.gleaner_panic) == 0, \"a panic is reachable in the image: \
+        build with GLEANER_ALLOW_PANIC=1, then firmware/cortex-m/panics.sh IMAGE lists its callers\")\n";
 
     pub fn prepare() {
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-        // The linker finds `memory.x` in the workspace's root; editing it must link again.
+        // The linker reads `memory.x` in the workspace root; a change must link again.
         println!("cargo::rerun-if-changed=../../memory.x");
         let mut script = read(Path::new("gleaner.x"));
         println!("cargo::rerun-if-env-changed=GLEANER_ALLOW_PANIC");
@@ -34,7 +34,7 @@ mod board {
         let mission = env::var_os("GLEANER_MISSION").map_or(PathBuf::from(EXAMPLE), PathBuf::from);
         println!("cargo::rerun-if-env-changed=GLEANER_MISSION");
         fs::write(out.join("mission.bin"), image(&mission)).expect("OUT_DIR can be written");
-        // defmt's own default is to leave out everything but errors.
+        // defmt's default level is `error`.
         println!("cargo::rerun-if-env-changed=DEFMT_LOG");
         println!("cargo::rustc-env=DEFMT_LOG={}", env::var("DEFMT_LOG").unwrap_or("info".to_owned()));
         println!("cargo::rustc-link-search={}", out.display());
@@ -46,7 +46,7 @@ mod board {
         }
     }
 
-    /// The mission as the board reads it, in a whole number of words.
+    /// The mission file as a mission image.
     fn image(path: &Path) -> Vec<u8> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let city = |name: &str| {

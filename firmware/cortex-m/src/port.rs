@@ -1,4 +1,4 @@
-//! A serial line as two rings, one interrupt and two counters.
+//! A serial line: two byte rings, one interrupt handler and two counters.
 
 use crate::Ring;
 use core::convert::Infallible;
@@ -8,34 +8,34 @@ use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 /// What can be wrong with a received byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineFault {
-    /// A byte was lost before this one: nobody took it from the receiver in time.
+    /// A byte was lost before this one: the receiver was not read in time.
     Overrun,
-    /// Wrong stop bit or noise: wrong speed, bad wiring, or the other end restarts. The byte is worthless.
+    /// Framing error or noise: wrong baud rate, bad wiring, or the other end restarts. The byte is discarded.
     Line,
 }
 
-/// The registers of one UART, as its interrupt handler needs them. An implementation touches nothing else.
+/// The registers of one UART that its interrupt handler needs. An implementation must access nothing else.
 pub trait Uart {
-    /// Takes what was received: a byte, a fault, or nothing.
-    fn take(&mut self) -> Option<Result<u8, LineFault>>;
-    /// Whether the transmitter has room for a byte.
+    /// Reads the receiver: a byte, a fault, or nothing.
+    fn receive(&mut self) -> Option<Result<u8, LineFault>>;
+    /// Whether the transmitter can accept a byte.
     fn has_room(&mut self) -> bool;
-    /// Hands a byte to the transmitter. Called only after `has_room` said so.
-    fn give(&mut self, byte: u8);
-    /// Whether the interrupt comes when the transmitter has room.
-    fn call_for_more(&mut self, on: bool);
+    /// Writes a byte to the transmitter. Called only after `has_room` returned true.
+    fn transmit(&mut self, byte: u8);
+    /// Enables or disables the interrupt for an empty transmitter.
+    fn interrupt_when_empty(&mut self, on: bool);
 }
 
-/// Counters of a port since boot. They stop at their maximum.
+/// Counters of a port since boot. They saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PortStats {
-    /// Bytes lost on the way in: the program or the interrupt came too late.
+    /// Received bytes lost because the interrupt or the program was late.
     pub lost: u32,
-    /// Bytes received damaged.
+    /// Bytes received with an error.
     pub damaged: u32,
 }
 
-/// A serial line. Lives in a `static`, so that its interrupt finds it.
+/// A serial line. It is a `static`, so that its interrupt handler can reach it.
 pub struct Port<const IN: usize, const OUT: usize> {
     incoming: Ring<IN>,
     outgoing: Ring<OUT>,
@@ -50,10 +50,11 @@ impl<const IN: usize, const OUT: usize> Default for Port<IN, OUT> {
 }
 
 impl<const IN: usize, const OUT: usize> Port<IN, OUT> {
-    /// Bytes moved by one interrupt at most: a UART that answers "received" for ever must not hold the program.
+    /// Most bytes that one interrupt moves in each direction: a UART that reports data forever must not block the
+    /// program.
     const PER_INTERRUPT: usize = 32;
 
-    /// A silent line.
+    /// A port with empty rings.
     #[must_use]
     pub const fn new() -> Port<IN, OUT> {
         Port {
@@ -64,13 +65,13 @@ impl<const IN: usize, const OUT: usize> Port<IN, OUT> {
         }
     }
 
-    /// The interrupt: moves bytes between the rings and the wire. Only the port's own interrupt may call it.
+    /// The interrupt handler: moves bytes between the rings and the UART. Only the port's own interrupt may call it.
     ///
     /// # Cost
-    /// At most 32 bytes each way, some 20 instructions a byte.
+    /// At most 32 bytes in each direction, about 20 instructions per byte.
     pub fn serve(&self, uart: &mut impl Uart) {
         for _ in 0..Port::<IN, OUT>::PER_INTERRUPT {
-            match uart.take() {
+            match uart.receive() {
                 Some(Ok(byte)) => {
                     if !self.incoming.push(byte) {
                         count(&self.lost);
@@ -86,11 +87,11 @@ impl<const IN: usize, const OUT: usize> Port<IN, OUT> {
                 break;
             }
             match self.outgoing.pop() {
-                Some(byte) => uart.give(byte),
+                Some(byte) => uart.transmit(byte),
                 None => break,
             }
         }
-        uart.call_for_more(self.outgoing.held() > 0);
+        uart.interrupt_when_empty(self.outgoing.held() > 0);
     }
 
     /// The counters.
@@ -99,23 +100,22 @@ impl<const IN: usize, const OUT: usize> Port<IN, OUT> {
         PortStats { lost: self.lost.load(Ordering::Relaxed), damaged: self.damaged.load(Ordering::Relaxed) }
     }
 
-    /// The outgoing ring, for a writer that wants all of its bytes in or none.
+    /// The outgoing ring, for a writer that needs all of its bytes accepted or none.
     #[must_use]
     pub const fn outgoing(&self) -> &Ring<OUT> {
         &self.outgoing
     }
 }
 
-/// Counts up to the maximum. Interrupts are the only writers, so load and store may be apart.
+/// Saturating increment. Interrupts are the only writers, so load and store need not be one operation.
 fn count(counter: &AtomicU32) {
     counter.store(counter.load(Ordering::Relaxed).saturating_add(1), Ordering::Relaxed);
 }
 
-/// The program's end of a port: `embedded-io`, with the promise that nothing waits as long as `read_ready` and
-/// `write_ready` are asked first.
+/// The program's end of a port. Nothing blocks when `read_ready` and `write_ready` are checked first.
 pub struct Endpoint<'p, const IN: usize, const OUT: usize> {
     port: &'p Port<IN, OUT>,
-    /// Makes the port's interrupt run soon.
+    /// Sets the port's interrupt pending.
     wake: fn(),
 }
 
@@ -191,23 +191,23 @@ mod tests {
         arrives: VecDeque<Result<u8, LineFault>>,
         room: usize,
         sent: Vec<u8>,
-        calls: bool,
+        interrupts: bool,
     }
 
     impl Uart for Double {
-        fn take(&mut self) -> Option<Result<u8, LineFault>> {
+        fn receive(&mut self) -> Option<Result<u8, LineFault>> {
             self.arrives.pop_front()
         }
         fn has_room(&mut self) -> bool {
             self.room > 0
         }
-        fn give(&mut self, byte: u8) {
+        fn transmit(&mut self, byte: u8) {
             assert!(self.room > 0, "a byte without room is lost");
             self.room -= 1;
             self.sent.push(byte);
         }
-        fn call_for_more(&mut self, on: bool) {
-            self.calls = on;
+        fn interrupt_when_empty(&mut self, on: bool) {
+            self.interrupts = on;
         }
     }
 
@@ -244,16 +244,16 @@ mod tests {
     }
 
     #[test]
-    fn the_transmitter_calls_until_the_ring_is_empty() {
+    fn the_transmit_interrupt_is_on_until_the_ring_is_empty() {
         let port = Port::<4, 8>::new();
         let mut endpoint = Endpoint::new(&port, || {});
         assert_eq!(endpoint.write(&[1, 2, 3, 4, 5]), Ok(5));
         let mut uart = Double { room: 2, ..Double::default() };
         port.serve(&mut uart);
-        assert_eq!((uart.sent.as_slice(), uart.calls), (&[1, 2][..], true));
+        assert_eq!((uart.sent.as_slice(), uart.interrupts), (&[1, 2][..], true));
         uart.room = 10;
         port.serve(&mut uart);
-        assert_eq!((uart.sent.as_slice(), uart.calls), (&[1, 2, 3, 4, 5][..], false));
+        assert_eq!((uart.sent.as_slice(), uart.interrupts), (&[1, 2, 3, 4, 5][..], false));
         assert_eq!(endpoint.write(&[0; 20]), Ok(8));
         assert_eq!(endpoint.write_ready(), Ok(false));
     }

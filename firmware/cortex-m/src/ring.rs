@@ -1,11 +1,11 @@
-//! A queue of bytes between an interrupt and the program, without locks.
+//! A lock-free byte queue between an interrupt and the program.
 
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
-/// Up to `N` bytes from one writer to one reader, each of which may interrupt the other. `N` is a power of two.
+/// Holds up to `N` bytes; `N` is a power of two. One writer and one reader may use it at the same time.
 ///
-/// The positions count all bytes ever written and read and wrap; what lies between them is held. A writer moves
-/// only `written`, a reader only `read`, and each after the bytes themselves.
+/// `written` and `read` count all bytes since the start and wrap; their difference is the number of bytes held. Only
+/// the writer stores `written` and only the reader stores `read`, each after it has accessed the byte.
 pub struct Ring<const N: usize> {
     bytes: [AtomicU8; N],
     written: AtomicU32,
@@ -26,19 +26,19 @@ impl<const N: usize> Ring<N> {
         Ring { bytes: [const { AtomicU8::new(0) }; N], written: AtomicU32::new(0), read: AtomicU32::new(0) }
     }
 
-    /// How many bytes are held.
+    /// Number of bytes held.
     #[must_use]
     pub fn held(&self) -> usize {
         self.written.load(Ordering::Acquire).wrapping_sub(self.read.load(Ordering::Acquire)) as usize
     }
 
-    /// How many more fit.
+    /// Number of bytes that fit.
     #[must_use]
     pub fn room(&self) -> usize {
         N.saturating_sub(self.held())
     }
 
-    /// Appends a byte; false when there is no room. For the one writer.
+    /// Appends a byte; returns false when the ring is full. For the writer only.
     pub fn push(&self, byte: u8) -> bool {
         let at = self.written.load(Ordering::Relaxed);
         if self.room() == 0 {
@@ -51,7 +51,7 @@ impl<const N: usize> Ring<N> {
         true
     }
 
-    /// Takes the oldest byte. For the one reader.
+    /// Removes the oldest byte. For the reader only.
     pub fn pop(&self) -> Option<u8> {
         if self.held() == 0 {
             return None;
@@ -62,7 +62,7 @@ impl<const N: usize> Ring<N> {
         byte
     }
 
-    /// Takes as many bytes as `buffer` has room for; how many.
+    /// Removes bytes into `buffer`; returns their number.
     pub fn pop_into(&self, buffer: &mut [u8]) -> usize {
         let mut taken = 0;
         for slot in buffer {
@@ -73,7 +73,7 @@ impl<const N: usize> Ring<N> {
         taken
     }
 
-    /// Appends as many bytes as fit; how many.
+    /// Appends as many bytes as fit; returns their number.
     pub fn push_from(&self, bytes: &[u8]) -> usize {
         bytes.iter().take_while(|&&byte| self.push(byte)).count()
     }
@@ -85,7 +85,7 @@ mod tests {
     use std::thread;
 
     #[test]
-    fn what_goes_in_comes_out_and_no_more_fits_than_is_promised() {
+    fn bytes_come_out_in_order_and_room_is_exact() {
         let ring = Ring::<8>::new();
         let mut next_in = 0u8;
         let mut next_out = 0u8;

@@ -1,21 +1,19 @@
-//! The parameters in flash, power-cut safe.
+//! The parameters in flash, safe against power loss.
 //!
 //! # Why not a crate
-//! `sequential-storage` and `ekv` keep any keys and values, and erase when they think it is time. On a microcontroller
-//! with one bank of flash an erase stops the processor for up to half a second, so here the caller decides when one
-//! may happen, and nine numbers need no keys: a record holds all of them.
+//! `sequential-storage` and `ekv` store arbitrary keys and decide themselves when to erase. On a microcontroller with
+//! one flash bank an erase stops the processor for up to half a second, so here the caller decides when one may
+//! happen. A handful of numbers needs no keys: a record holds all of them.
 //!
 //! # Layout
-//! Two sectors, each a row of slots of 64 bytes. A slot is erased, or it holds a record: all parameters, a sequence
-//! number and a checksum. The record with the highest number counts. The next one goes into the next erased slot of
-//! the same sector; when there is none left, the *other* sector is erased and begins with it. The newest record is
-//! therefore never in a sector that is being erased, and whenever the power goes, the record before or the record
-//! after the change is whole.
+//! Two sectors of 64-byte slots. A slot is erased or holds a record: all parameters, a sequence number and a checksum.
+//! The record with the highest number is the current one. The next record goes into the next erased slot of the same
+//! sector; when no slot is left, the *other* sector is erased and starts with it. The newest record is therefore never
+//! in a sector that is being erased, and after a power loss the old or the new record is intact.
 //!
-//! # When you may trust it
-//! What [`ParameterStore::open`] gives was saved as a whole, or is the defaults, and [`Found`] says which. That a
-//! half-written slot reads the same every time is not assumed: its checksum is looked at at every start, and no slot
-//! is written twice without an erase.
+//! # Guarantees
+//! [`ParameterStore::open`] returns a complete record or the defaults; [`Restored`] says which. A half-written slot may
+//! read differently each time: checksums are verified at every start, and no slot is written twice between erases.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use embedded_storage::nor_flash::NorFlash;
@@ -23,14 +21,14 @@ use gleaner_pilot::{Enable, ParameterId, Parameters};
 
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 const MAGIC: [u8; 4] = *b"GLNP";
-/// The layout of a record. Parameters are only ever added at the end, so a shorter record of this version is read.
+/// Version of the record layout. Parameters are only appended, so a shorter record of this version is accepted.
 const VERSION: u16 = 1;
 const SECTORS: u32 = 2;
-/// Of one record: a multiple of every flash's unit of writing.
+/// Size of a record: a multiple of every flash's write unit.
 const SLOT_BYTES: usize = 64;
 const VALUES_AT: usize = 12;
 const CRC_AT: usize = SLOT_BYTES - 4;
-/// Values that a record has room for.
+/// Largest number of values in a record.
 const VALUES_MAX: usize = (CRC_AT - VALUES_AT) / 4;
 const ERASED: u8 = 0xFF;
 
@@ -38,25 +36,25 @@ const _: () = assert!(gleaner_link::PARAMETERS.len() <= VALUES_MAX);
 
 type Slot = [u8; SLOT_BYTES];
 
-/// What was found at the start.
+/// Result of restoring the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
-    /// Nothing was ever saved: the defaults.
+pub enum Restored {
+    /// The flash is erased: the defaults.
     Nothing,
-    /// The parameters that were saved last.
+    /// The parameters of the last save.
     Saved,
-    /// The parameters of a whole record, but a later one or one of its values is damaged: what is missing is lost.
+    /// The parameters of a valid record, but a later record or one of its values is damaged.
     Older,
-    /// No record is whole, and yet the flash is not erased: the defaults.
+    /// The flash is not erased and no record is valid: the defaults.
     Damaged,
 }
 
-/// Why parameters were not saved.
+/// Reason why a save failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SaveError {
-    /// A sector must be erased first, and the caller did not allow it. Try again when it may be.
+    /// A sector must be erased first, and the caller did not allow it. Retry when erasing is allowed.
     Full,
-    /// The flash refuses, or does not hold what was written.
+    /// The flash refused, or reads back different bytes.
     Flash,
 }
 
@@ -64,7 +62,7 @@ pub enum SaveError {
 pub struct ParameterStore<F> {
     flash: F,
     sector: u32,
-    /// The next slot to look at in that sector.
+    /// The next slot to try in that sector.
     slot: u32,
     sequence: u32,
 }
@@ -72,13 +70,13 @@ pub struct ParameterStore<F> {
 impl<F: NorFlash> ParameterStore<F> {
     const SLOTS: u32 = (F::ERASE_SIZE / SLOT_BYTES) as u32;
 
-    /// Looks for the newest record. Writes nothing.
+    /// Finds the newest record. Writes nothing.
     ///
     /// # Cost
     /// One pass over the two sectors.
-    pub fn open(flash: F) -> (ParameterStore<F>, Parameters, Found) {
+    pub fn open(flash: F) -> (ParameterStore<F>, Parameters, Restored) {
         const { assert!(F::ERASE_SIZE >= SLOT_BYTES && SLOT_BYTES.is_multiple_of(F::WRITE_SIZE)) };
-        // With nothing found, the last sector is "full": the first save erases sector 0.
+        // Without a record the last sector counts as full: the first save erases sector 0.
         let mut store = ParameterStore { flash, sector: SECTORS - 1, slot: Self::SLOTS, sequence: 0 };
         let mut newest: Option<(Slot, u32)> = None;
         let mut spoilt = None;
@@ -99,21 +97,21 @@ impl<F: NorFlash> ParameterStore<F> {
             }
         }
         let Some((record, _)) = newest else {
-            let found = if spoilt.is_some() { Found::Damaged } else { Found::Nothing };
+            let found = if spoilt.is_some() { Restored::Damaged } else { Restored::Nothing };
             return (store, Parameters::default(), found);
         };
         let (parameters, complete) = parameters_of(&record);
-        // A damaged slot behind the newest record was to be newer; elsewhere it is of no account any more.
+        // A damaged slot behind the newest record was a later save; elsewhere it is older and does not matter.
         let later = spoilt.is_some_and(|(sector, slot)| sector == store.sector && slot >= store.slot);
-        let found = if complete && !later { Found::Saved } else { Found::Older };
+        let found = if complete && !later { Restored::Saved } else { Restored::Older };
         (store, parameters, found)
     }
 
-    /// Saves all parameters but `GLN_ENABLE`, which is 0 after every start. `may_erase` allows it to erase a sector,
-    /// during which the processor may stand still.
+    /// Saves all parameters; `GLN_ENABLE` is saved as 0. `may_erase` permits erasing a sector, which may stop the
+    /// processor meanwhile.
     ///
     /// # Errors
-    /// See [`SaveError`]; what was saved before is still there.
+    /// See [`SaveError`]; the previous record stays valid.
     pub fn save(&mut self, parameters: &Parameters, may_erase: bool) -> Result<(), SaveError> {
         let record = record(parameters, self.sequence.wrapping_add(1));
         while self.slot < Self::SLOTS {
@@ -144,7 +142,7 @@ impl<F: NorFlash> ParameterStore<F> {
         Some(bytes)
     }
 
-    /// Writes a record and looks whether it is there.
+    /// Writes a record and reads it back.
     fn write(&mut self, sector: u32, slot: u32, record: &Slot) -> bool {
         let written = self.flash.write(offset::<F>(sector, slot), record).is_ok();
         if written && self.read(sector, slot).as_ref() == Some(record) {
@@ -184,7 +182,7 @@ fn checksum(slot: &Slot) -> u32 {
     CRC.checksum(slot.split_last_chunk::<4>().map_or(&[][..], |(content, _)| content))
 }
 
-/// The sequence number of a whole record.
+/// The sequence number of a valid record.
 fn sequence_of(slot: &Slot) -> Option<u32> {
     let (header, _) = slot.split_first_chunk::<VALUES_AT>()?;
     let [m0, m1, m2, m3, v0, v1, _, _, s0, s1, s2, s3] = *header;
@@ -195,8 +193,8 @@ fn sequence_of(slot: &Slot) -> Option<u32> {
     is_whole.then_some(u32::from_le_bytes([s0, s1, s2, s3]))
 }
 
-/// The parameters of a whole record, and whether every value was allowed; a value that is not (another program had
-/// other ranges) is the default.
+/// The parameters of a valid record, and whether every value was in range. A value out of range (written by a program
+/// with other ranges) becomes the default.
 fn parameters_of(slot: &Slot) -> (Parameters, bool) {
     let mut parameters = Parameters::default();
     let mut complete = true;

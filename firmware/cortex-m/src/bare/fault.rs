@@ -1,45 +1,45 @@
-//! The end of the program: stop transmitting, say why in RAM that no one clears, reset.
+//! The end of the program: stop transmitting, record the cause in RAM that survives a reset, reset.
 //!
-//! A reset alone already silences the ports. The transmitters are stopped first all the same, so that nothing
-//! half-written can leave while the words are kept.
+//! The reset stops the transmitters too. They are stopped first so that no partial frame is sent while the record is
+//! written.
 #![allow(unsafe_code)]
 
-use super::lines::gleaner_silence;
-use crate::{Cause, LastWords};
+use super::serial::gleaner_stop_transmitters;
+use crate::{Cause, ResetRecord};
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::{ExceptionFrame, exception};
 
 unsafe extern "C" {
-    /// RAM that the memory map keeps out of every section: nothing clears it at a start, so it holds the last words
-    /// over a reset, and noise after power was off.
+    /// RAM outside every section: startup code does not clear it, so it survives a reset and is noise after a power
+    /// cycle.
     // SAFETY: aligned and large enough by the memory map; every bit pattern is a valid u32.
-    safe static _last_words: [AtomicU32; 5];
+    safe static _reset_record: [AtomicU32; 5];
 }
 
-/// What is kept in RAM.
-pub(super) fn last_words() -> LastWords {
-    LastWords::from_words(core::array::from_fn(|at| {
-        _last_words.get(at).map_or(0, |word| word.load(Ordering::Relaxed))
+/// The record in RAM.
+pub(super) fn reset_record() -> ResetRecord {
+    ResetRecord::from_words(core::array::from_fn(|at| {
+        _reset_record.get(at).map_or(0, |word| word.load(Ordering::Relaxed))
     }))
 }
 
-/// Keeps words over a reset.
-pub(super) fn keep(words: LastWords) {
-    for (slot, word) in _last_words.iter().zip(words.words()) {
+/// Writes the record.
+pub(super) fn keep(record: ResetRecord) {
+    for (slot, word) in _reset_record.iter().zip(record.words()) {
         slot.store(word, Ordering::Relaxed);
     }
 }
 
-/// Ends the program: silent, with its last words kept, by a reset.
+/// Ends the program: stops the transmitters, records the cause, resets.
 pub fn end(cause: Cause) -> ! {
     cortex_m::interrupt::disable();
-    gleaner_silence();
-    keep(last_words().ended(cause));
+    gleaner_stop_transmitters();
+    keep(reset_record().ended(cause));
     SCB::sys_reset()
 }
 
-// SAFETY: takes the place of the default handler; nothing of the faulted program is used again.
+// SAFETY: replaces the default handler and never returns to the faulted program.
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     end(Cause::HardFault { at: frame.pc() })
@@ -51,8 +51,8 @@ unsafe fn DefaultHandler(interrupt: i16) -> ! {
     end(Cause::Unexpected { interrupt: interrupt as u32 })
 }
 
-/// Stands in a section of its own, so that the link can tell whether a panic can be reached at all.
-// SAFETY: an ordinary function in a section of flash that is kept for it.
+/// Placed in a section of its own: the linker script asserts that it is empty, which means no panic is reachable.
+// SAFETY: an ordinary function in a flash section that is reserved for it.
 #[unsafe(link_section = ".gleaner_panic")]
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {

@@ -1,15 +1,16 @@
-//! What runs only where there is no operating system, the same on every Cortex-M: time, faults, the log, the main
-//! loop. Exists for targets without an operating system only.
+//! The part that runs without an operating system only: time, faults, the log, the main loop.
 
+mod defmt_log;
 mod fault;
-mod flash;
 mod fly;
-mod lines;
-mod log;
+mod images;
+mod parameter_place;
+mod serial;
+pub mod stm32;
 mod time;
 
 pub use fault::end;
-pub use flash::{Refused, parameter_bytes, parameter_place};
-pub use fly::{Board, fly};
-pub use lines::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
-pub use time::{now, start_clock};
+pub use fly::fly;
+pub use parameter_place::{parameter_bytes, parameter_place};
+pub use serial::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
+pub use time::{SysTickDelay, now, start_clock};

@@ -1,4 +1,4 @@
-//! The main loop on doubles of its ports.
+//! The main loop over doubles of its ports.
 
 use super::*;
 use core::convert::Infallible;
@@ -12,7 +12,7 @@ use std::rc::Rc;
 use std::string::String;
 use std::vec::Vec;
 
-/// A line that brings the same byte for ever, or nothing, and takes so many bytes.
+/// A line that delivers the same byte forever, or nothing, and accepts `room` bytes.
 #[derive(Clone, Default)]
 struct Line(Rc<RefCell<Wire>>);
 
@@ -37,7 +37,7 @@ impl ReadReady for Line {
 impl Read for Line {
     fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Infallible> {
         let mut wire = self.0.borrow_mut();
-        buffer.fill(wire.floods.expect("asked only when ready: it would wait for ever"));
+        buffer.fill(wire.floods.expect("hardware would block: check readiness first"));
         wire.taken += buffer.len();
         Ok(buffer.len())
     }
@@ -52,7 +52,7 @@ impl WriteReady for Line {
 impl Write for Line {
     fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
         let mut wire = self.0.borrow_mut();
-        assert!(wire.room > 0, "asked only when ready: it would wait for ever");
+        assert!(wire.room > 0, "hardware would block: check readiness first");
         let count = bytes.len().min(wire.room);
         wire.room -= count;
         wire.sent.extend_from_slice(&bytes[..count]);
@@ -79,7 +79,7 @@ struct Notes {
     losses: Vec<(String, PortStats)>,
 }
 
-impl Journal for Notes {
+impl EventLog for Notes {
     fn state(&mut self, from: State, to: State) {
         self.states.push((from, to));
     }
@@ -118,7 +118,7 @@ fn ids(mut bytes: &[u8]) -> Vec<u32> {
 }
 
 #[test]
-fn a_flood_on_both_lines_starves_nothing() {
+fn a_flood_on_both_lines_delays_no_poll() {
     for byte in [0x55, 0xFD] {
         let (mut runtime, link, radio) = runtime();
         for line in [&link, &radio] {
@@ -135,29 +135,29 @@ fn a_flood_on_both_lines_starves_nothing() {
         }
         assert_eq!(polls, 500, "every 20 ms");
         let heartbeats = ids(&link.0.borrow().sent).iter().filter(|&&id| id == 0).count();
-        // From the fifth second on, when no autopilot was heard.
+        // Heartbeats start after 5 s without an autopilot.
         assert_eq!(heartbeats, 5, "with {byte:#x}");
         assert_eq!(notes.states, [(State::Boot, State::Fault)]);
     }
 }
 
 #[test]
-fn a_line_that_takes_little_gets_whole_frames_and_the_newest() {
+fn a_slow_line_gets_complete_and_recent_frames() {
     let (mut runtime, link, _) = runtime();
     let mut notes = Notes::default();
     for milli in 0..12_000 {
-        // 3 kB/s, and nothing at all for two seconds.
+        // 3 kB/s, and nothing for two seconds.
         link.0.borrow_mut().room = if (7_000..9_000).contains(&milli) { 0 } else { 3 };
         runtime.pass(Instant::from_millis(milli), [PortStats::default(); 2], &mut notes);
     }
     link.0.borrow_mut().room = usize::MAX;
     runtime.pass(Instant::from_millis(12_001), [PortStats::default(); 2], &mut notes);
     let heartbeats = ids(&link.0.borrow().sent).iter().filter(|&&id| id == 0).count();
-    assert!((5..=7).contains(&heartbeats), "one a second but in the silence, none twice: {heartbeats}");
+    assert!((5..=7).contains(&heartbeats), "one a second except in the gap: {heartbeats}");
 }
 
 #[test]
-fn losses_are_said_once_and_then_at_most_every_ten_seconds() {
+fn losses_are_reported_at_most_every_ten_seconds() {
     let (mut runtime, link, _) = runtime();
     link.0.borrow_mut().room = usize::MAX;
     let mut notes = Notes::default();
@@ -165,6 +165,6 @@ fn losses_are_said_once_and_then_at_most_every_ten_seconds() {
         let losses = PortStats { lost: milli / 100, damaged: 0 };
         runtime.pass(Instant::from_millis(milli.into()), [PortStats::default(), losses], &mut notes);
     }
-    let said: Vec<_> = notes.losses.iter().map(|(port, stats)| (port.as_str(), stats.lost)).collect();
-    assert_eq!(said, [("radio", 1), ("radio", 101), ("radio", 201)]);
+    let reported: Vec<_> = notes.losses.iter().map(|(port, stats)| (port.as_str(), stats.lost)).collect();
+    assert_eq!(reported, [("radio", 1), ("radio", 101), ("radio", 201)]);
 }

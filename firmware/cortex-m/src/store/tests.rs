@@ -1,4 +1,4 @@
-//! The store on a double that is stricter than flash.
+//! The store over a double that is stricter than flash.
 
 use super::*;
 use embedded_storage::nor_flash::{ErrorType, NorFlashError, NorFlashErrorKind, ReadNorFlash};
@@ -9,13 +9,13 @@ use std::vec::Vec;
 const SECTOR: usize = 4 * SLOT_BYTES;
 const WORD: usize = 4;
 
-/// Flash that is written word by word, each word once between erases, erased by the sector, and that may lose power
-/// at any single operation. It outlives the program.
+/// Flash that accepts each word once between erases, erases one sector at a time, and can lose power during any
+/// operation. It outlives the store.
 #[derive(Default)]
 struct Chip {
     bytes: Vec<u8>,
     written: Vec<bool>,
-    /// Operations until the power goes, in the middle of the last one.
+    /// Operations until power is lost, in the middle of the last one.
     power_for: Option<usize>,
     operations: usize,
     noise: u32,
@@ -25,9 +25,9 @@ struct Chip {
 pub(crate) struct Double(Rc<RefCell<Chip>>);
 
 #[derive(Debug, PartialEq)]
-pub(crate) struct PowerGone;
+pub(crate) struct PowerLost;
 
-impl NorFlashError for PowerGone {
+impl NorFlashError for PowerLost {
     fn kind(&self) -> NorFlashErrorKind {
         NorFlashErrorKind::Other
     }
@@ -39,11 +39,11 @@ impl Chip {
         (self.noise >> 24) as u8
     }
 
-    /// Whether this operation is done, done by half or not at all.
-    fn operate(&mut self) -> Result<bool, PowerGone> {
+    /// `Ok(true)`: complete; `Ok(false)`: interrupted; `Err`: no power.
+    fn operate(&mut self) -> Result<bool, PowerLost> {
         self.operations += 1;
         match &mut self.power_for {
-            Some(0) => Err(PowerGone),
+            Some(0) => Err(PowerLost),
             Some(left) => {
                 *left -= 1;
                 Ok(*left > 0)
@@ -60,7 +60,7 @@ impl Double {
         Double(Rc::new(RefCell::new(Chip { bytes, written, noise: 1, ..Chip::default() })))
     }
 
-    /// Operations done so far, whole or not.
+    /// Operations so far, complete or not.
     pub(crate) fn operations(&self) -> usize {
         self.0.borrow().operations
     }
@@ -71,13 +71,13 @@ impl Double {
 }
 
 impl ErrorType for Double {
-    type Error = PowerGone;
+    type Error = PowerLost;
 }
 
 impl ReadNorFlash for Double {
     const READ_SIZE: usize = 1;
 
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerGone> {
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerLost> {
         let chip = self.0.borrow();
         bytes.copy_from_slice(&chip.bytes[offset as usize..offset as usize + bytes.len()]);
         Ok(())
@@ -92,13 +92,13 @@ impl NorFlash for Double {
     const WRITE_SIZE: usize = WORD;
     const ERASE_SIZE: usize = SECTOR;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerGone> {
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerLost> {
         let (from, to) = (from as usize, to as usize);
         assert!(from % SECTOR == 0 && to == from + SECTOR && to <= 2 * SECTOR, "one sector at a time");
         let mut chip = self.0.borrow_mut();
         let whole = chip.operate()?;
         for at in from..to {
-            // A cut erase leaves anything: old bytes, erased ones, neither.
+            // An interrupted erase leaves old bytes, erased bytes or a mixture.
             chip.bytes[at] = match chip.random() % 3 {
                 _ if whole => 0xFF,
                 0 => 0xFF,
@@ -107,10 +107,10 @@ impl NorFlash for Double {
             };
             chip.written[at / WORD] = !whole;
         }
-        if whole { Ok(()) } else { Err(PowerGone) }
+        if whole { Ok(()) } else { Err(PowerLost) }
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerGone> {
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerLost> {
         assert!((offset as usize).is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD), "whole words");
         let mut chip = self.0.borrow_mut();
         for (index, word) in bytes.chunks(WORD).enumerate() {
@@ -123,7 +123,7 @@ impl NorFlash for Double {
                 chip.bytes[byte] &= mask;
             }
             if !whole {
-                return Err(PowerGone);
+                return Err(PowerLost);
             }
         }
         Ok(())
@@ -141,10 +141,10 @@ fn speed(parameters: &Parameters) -> f32 {
 }
 
 #[test]
-fn what_was_saved_last_is_found_through_many_erases() {
+fn the_last_save_is_restored_through_many_erases() {
     let double = Double::new();
     let (_, parameters, found) = ParameterStore::open(double.clone());
-    assert_eq!((parameters, found), (Parameters::default(), Found::Nothing));
+    assert_eq!((parameters, found), (Parameters::default(), Restored::Nothing));
     for round in 0..40_u8 {
         let (mut store, _, _) = ParameterStore::open(double.clone());
         let mut saved = with_speed(1.0 + f32::from(round % 19));
@@ -152,12 +152,12 @@ fn what_was_saved_last_is_found_through_many_erases() {
         assert_eq!(store.save(&saved, true), Ok(()));
         saved.set_id(ParameterId::Enable, 0.0).unwrap();
         let (_, parameters, found) = ParameterStore::open(double.clone());
-        assert_eq!((parameters, found), (saved, Found::Saved), "round {round}: all but GLN_ENABLE");
+        assert_eq!((parameters, found), (saved, Restored::Saved), "round {round}: all but GLN_ENABLE");
     }
 }
 
 #[test]
-fn without_permission_nothing_is_erased_and_nothing_is_lost() {
+fn without_permission_nothing_is_erased_or_lost() {
     let double = Double::new();
     let (mut store, _, _) = ParameterStore::open(double.clone());
     assert_eq!(store.save(&with_speed(2.0), false), Err(SaveError::Full), "the first save erases");
@@ -171,7 +171,7 @@ fn without_permission_nothing_is_erased_and_nothing_is_lost() {
 }
 
 #[test]
-fn the_power_may_go_at_every_single_operation() {
+fn power_may_be_lost_during_any_operation() {
     let run = |power_for: Option<usize>| {
         let double = Double::new();
         let mut before = speed(&Parameters::default());
@@ -190,14 +190,14 @@ fn the_power_may_go_at_every_single_operation() {
             assert!(!cut, "only once");
             cut = true;
             double.power_for(None);
-            // Back on: the value before or the value after, whole.
+            // Power is back: the old value or the new one, intact.
             let (mut store, parameters, found) = ParameterStore::open(double.clone());
             assert!(
                 [before, wanted].contains(&speed(&parameters)),
                 "power for {power_for:?}: {parameters:?}"
             );
-            assert!(found != Found::Damaged || before == speed(&Parameters::default()));
-            assert_eq!(store.save(&with_speed(wanted), true), Ok(()), "and it can be saved again");
+            assert!(found != Restored::Damaged || before == speed(&Parameters::default()));
+            assert_eq!(store.save(&with_speed(wanted), true), Ok(()), "the next save succeeds");
             before = wanted;
         }
         (double.0.borrow().operations, cut)
@@ -210,15 +210,15 @@ fn the_power_may_go_at_every_single_operation() {
 }
 
 #[test]
-fn a_corrupted_sector_falls_back_and_says_so() {
+fn a_corrupted_record_falls_back_to_the_one_before() {
     let zeros = Double::new();
     zeros.0.borrow_mut().bytes.fill(0);
     let (mut store, parameters, found) = ParameterStore::open(zeros.clone());
-    assert_eq!((parameters, found), (Parameters::default(), Found::Damaged));
+    assert_eq!((parameters, found), (Parameters::default(), Restored::Damaged));
     assert_eq!(store.save(&with_speed(7.0), true), Ok(()));
     assert_eq!(speed(&ParameterStore::open(zeros).1), 7.0);
 
-    // Any bit of the newest record: the one before it.
+    // Any flipped bit of the newest record restores the one before.
     for bit in 0..SLOT_BYTES * 8 {
         let double = Double::new();
         let (mut store, _, _) = ParameterStore::open(double.clone());
@@ -226,12 +226,12 @@ fn a_corrupted_sector_falls_back_and_says_so() {
         assert_eq!(store.save(&with_speed(4.0), true), Ok(()));
         double.0.borrow_mut().bytes[SLOT_BYTES + bit / 8] ^= 1 << (bit % 8);
         let (_, parameters, found) = ParameterStore::open(double);
-        assert_eq!((speed(&parameters), found), (3.0, Found::Older), "bit {bit}");
+        assert_eq!((speed(&parameters), found), (3.0, Restored::Older), "bit {bit}");
     }
 }
 
 #[test]
-fn a_value_out_of_its_range_is_the_default() {
+fn a_value_out_of_range_becomes_the_default() {
     let mut slot = record(&with_speed(9.0), 1);
     slot[VALUES_AT + 4 * 2..][..4].copy_from_slice(&1e9_f32.to_le_bytes());
     let sum = checksum(&slot);

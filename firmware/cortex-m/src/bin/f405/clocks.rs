@@ -1,18 +1,18 @@
-//! Clocks: crystal, PLL, 168 MHz; or as much of it as works.
+//! Clocks: crystal, PLL, 168 MHz, or as much of it as works.
 //!
-//! Every wait has an end. A dead crystal must not stop the boot: the internal oscillator drives the PLL then, and
-//! a dead PLL leaves the bare 16 MHz of it.
+//! Every wait has a limit, so that a dead crystal does not stop the boot: the internal oscillator then drives the PLL,
+//! and with a dead PLL the core stays on its 16 MHz.
 
 use gleaner_cortex_m::ResetFlags;
 use stm32f4::stm32f405::{FLASH, RCC};
 
-/// The crystal of the board, MHz: 8 on the common ones. From 4 to 26 (RM0090, 7.2.1).
+/// Frequency of the board's crystal, MHz; 4 to 26 are possible (RM0090, 7.2.1).
 const CRYSTAL_MHZ: u8 = 8;
 const INTERNAL_MHZ: u8 = 16;
-/// Turns of a waiting loop, some 10 cycles each: 100 ms at 16 MHz, 50 times the crystal's start (DS8626, 6.3.8).
-const PATIENCE: u32 = 160_000;
+/// Iterations of a wait, about 10 cycles each: 100 ms at 16 MHz, 50 times the crystal's start (DS8626, 6.3.8).
+const WAIT_ITERATIONS: u32 = 160_000;
 
-/// What the core runs on.
+/// The clock of the core.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Clock {
     /// 168 MHz from the PLL, from the crystal or from the internal oscillator.
@@ -22,7 +22,7 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// Speed of the core.
+    /// Frequency of the core.
     pub const fn core_mhz(self) -> u32 {
         match self {
             Clock::Pll => 168,
@@ -30,7 +30,7 @@ impl Clock {
         }
     }
 
-    /// Speed of the bus of USART2, USART3 and UART4.
+    /// Frequency of the bus of USART2, USART3 and UART4.
     pub const fn apb1_hz(self) -> u32 {
         match self {
             Clock::Pll => 42_000_000,
@@ -39,10 +39,10 @@ impl Clock {
     }
 }
 
-/// Brings up the fastest clock that works.
+/// Starts the fastest clock that works.
 pub fn start(rcc: &RCC, flash: &FLASH) -> Clock {
-    // A ready bit is read-only: writing it changes nothing on the chip, and every read-modify-write of this
-    // register writes them back set. An emulator that models the register as plain memory takes it as the answer.
+    // The ready bits are read-only on the chip. They are written here for emulators that model the register as plain
+    // memory and would never report ready.
     rcc.cr().modify(|r, w| unsafe { w.bits(r.bits() | HSI_READY | HSE_READY).hseon().set_bit() });
     let crystal = wait(|| rcc.cr().read().hserdy().bit_is_set());
     let input_mhz = if crystal { CRYSTAL_MHZ } else { INTERNAL_MHZ };
@@ -56,7 +56,7 @@ pub fn start(rcc: &RCC, flash: &FLASH) -> Clock {
         rcc.cr().modify(|_, w| w.pllon().clear_bit());
         return Clock::Internal;
     }
-    // RM0090, table 10: 5 wait states above 150 MHz at 2.7 V and more. Cache and prefetch hide most of them.
+    // RM0090, table 10: 5 wait states above 150 MHz at 2.7 V or more. Cache and prefetch hide most of them.
     flash.acr().write(|w| w.latency().ws5().prften().set_bit().icen().set_bit().dcen().set_bit());
     rcc.cfgr().modify(|_, w| w.hpre().div1().ppre1().div4().ppre2().div2());
     rcc.cfgr().modify(|r, w| unsafe { w.bits(r.bits() | PLL_IS_CLOCK).sw().pll() });
@@ -73,14 +73,14 @@ pub fn start(rcc: &RCC, flash: &FLASH) -> Clock {
 const HSI_READY: u32 = 1 << 1;
 const HSE_READY: u32 = 1 << 17;
 const PLL_READY: u32 = 1 << 25;
-/// `SWS` says PLL.
+/// The PLL as reported in `SWS`.
 const PLL_IS_CLOCK: u32 = 0b10 << 2;
 
 fn wait(mut is_ready: impl FnMut() -> bool) -> bool {
-    (0..PATIENCE).any(|_| is_ready())
+    (0..WAIT_ITERATIONS).any(|_| is_ready())
 }
 
-/// Why the chip was reset; the flags are cleared, so that they tell of one reset only.
+/// Reads the cause of the reset and clears the flags, so that they describe one reset only.
 pub fn take_reset_flags(rcc: &RCC) -> ResetFlags {
     let csr = rcc.csr().read();
     let flags = ResetFlags {

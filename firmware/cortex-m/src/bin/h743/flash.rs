@@ -1,17 +1,12 @@
-//! The parameters' sectors: two of 128 KB in the first bank (RM0433, 4.3). The processor stands still while it fetches
-//! from a bank that is being erased.
+//! The flash controller (RM0433, chapter 4): two parameter sectors of 128 KB in the first bank. The processor stops
+//! while it fetches from a bank that is being erased.
 
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-use gleaner_cortex_m::bare::{Refused, parameter_bytes, parameter_place};
+use gleaner_cortex_m::FlashController;
+use gleaner_cortex_m::bare::{parameter_bytes, parameter_place};
 use stm32h7::stm32h743::FLASH;
 
-const SECTOR_BYTES: usize = 128 * 1024;
-/// The first sector of the two, by its number in the bank.
+/// Number of the first parameter sector in its bank.
 const FIRST_SECTOR: u32 = 1;
-/// The unit of writing, with its own error correction.
-const FLASH_WORD_BYTES: usize = 32;
-/// Turns of a waiting loop: some seconds.
-const PATIENCE: u32 = 20_000_000;
 
 const LOCKED: u32 = 1;
 const PROGRAM: u32 = 1 << 1;
@@ -22,82 +17,70 @@ const BUSY_OR_QUEUED: u32 = 0b101;
 /// RM0433, 4.9.5: all error flags of a bank.
 const ERRORS: u32 = 0x07EE_0000;
 
-/// Two sectors of flash.
-pub struct ParameterSectors {
-    registers: FLASH,
-}
+/// The flash registers.
+pub struct Controller(FLASH);
 
-impl ParameterSectors {
-    /// The sectors, with the registers that write them.
-    pub const fn new(registers: FLASH) -> ParameterSectors {
-        ParameterSectors { registers }
+impl Controller {
+    /// The controller behind these registers.
+    pub const fn new(registers: FLASH) -> Controller {
+        Controller(registers)
     }
 
-    fn operate(&mut self, wanted: u32, run: impl FnOnce(&FLASH)) -> Result<(), Refused> {
-        let (flash, bank) = (&self.registers, self.registers.bank1());
+    fn prepare(&mut self, operation: u32) -> bool {
+        let bank = self.0.bank1();
+        bank.cr().write(|w| unsafe { w.bits(operation) });
+        bank.cr().read().bits() == operation
+    }
+}
+
+impl FlashController for Controller {
+    const SECTOR_BYTES: usize = 128 * 1024;
+    /// One flash word, the unit of its error correction.
+    const WRITE_BYTES: usize = 32;
+    /// DS12110, table 53: 4 s at most for a sector of 128 KB.
+    const OPERATION_LIMIT_MS: u32 = 4500;
+
+    fn read(&self, offset: u32, bytes: &mut [u8]) {
+        parameter_bytes(offset, bytes);
+    }
+
+    fn unlock(&mut self) {
+        let bank = self.0.bank1();
         bank.keyr().write(|w| unsafe { w.bits(0x4567_0123) });
         bank.keyr().write(|w| unsafe { w.bits(0xCDEF_89AB) });
         bank.ccr().write(|w| unsafe { w.bits(ERRORS) });
-        bank.cr().write(|w| unsafe { w.bits(wanted) });
-        let mut result = Err(Refused);
-        if bank.cr().read().bits() == wanted {
-            run(flash);
-            let done = (0..PATIENCE).any(|_| bank.sr().read().bits() & BUSY_OR_QUEUED == 0);
-            if done && bank.sr().read().bits() & ERRORS == 0 {
-                result = Ok(());
+    }
+
+    fn start_erase(&mut self, sector: u32) -> bool {
+        let operation = WORDS_OF_64 | ERASE_SECTOR | (FIRST_SECTOR + sector) << 8;
+        let accepted = self.prepare(operation);
+        if accepted {
+            self.0.bank1().cr().write(|w| unsafe { w.bits(operation | START) });
+        }
+        accepted
+    }
+
+    fn start_write(&mut self, offset: u32, unit: &[u8]) -> bool {
+        let accepted = self.prepare(WORDS_OF_64 | PROGRAM);
+        for (at, four) in (offset..).step_by(4).zip(unit.chunks_exact(4)) {
+            let (Some(place), Some(word)) = (parameter_place(at), four.first_chunk()) else { return false };
+            if accepted {
+                // SAFETY: a word inside the sectors, which hold nothing but parameters.
+                unsafe { place.write_volatile(u32::from_le_bytes(*word)) };
             }
         }
-        bank.cr().write(|w| unsafe { w.bits(LOCKED) });
-        result
-    }
-}
-
-impl ErrorType for ParameterSectors {
-    type Error = Refused;
-}
-
-impl ReadNorFlash for ParameterSectors {
-    const READ_SIZE: usize = 1;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Refused> {
-        parameter_bytes(offset, bytes)
+        accepted
     }
 
-    fn capacity(&self) -> usize {
-        2 * SECTOR_BYTES
-    }
-}
-
-impl NorFlash for ParameterSectors {
-    const WRITE_SIZE: usize = FLASH_WORD_BYTES;
-    const ERASE_SIZE: usize = SECTOR_BYTES;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Refused> {
-        for sector in from / SECTOR_BYTES as u32..to / SECTOR_BYTES as u32 {
-            if sector > 1 {
-                return Err(Refused);
-            }
-            let wanted = WORDS_OF_64 | ERASE_SECTOR | (FIRST_SECTOR + sector) << 8;
-            self.operate(wanted, |flash| {
-                flash.bank1().cr().write(|w| unsafe { w.bits(wanted | START) });
-            })?;
-        }
-        Ok(())
+    fn is_busy(&self) -> bool {
+        self.0.bank1().sr().read().bits() & BUSY_OR_QUEUED != 0
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refused> {
-        for (index, flash_word) in bytes.chunks_exact(FLASH_WORD_BYTES).enumerate() {
-            let at = offset + (index * FLASH_WORD_BYTES) as u32;
-            self.operate(WORDS_OF_64 | PROGRAM, |_| {
-                for (word, four) in flash_word.chunks_exact(4).enumerate() {
-                    let value = four.first_chunk().map_or(u32::MAX, |bytes| u32::from_le_bytes(*bytes));
-                    if let Ok(place) = parameter_place(at + word as u32 * 4) {
-                        // SAFETY: a word inside the sectors, where only parameters stand.
-                        unsafe { place.write_volatile(value) };
-                    }
-                }
-            })?;
-        }
-        Ok(())
+    fn has_failed(&self) -> bool {
+        self.0.bank1().sr().read().bits() & ERRORS != 0
+    }
+
+    fn lock(&mut self) {
+        self.0.bank1().cr().write(|w| unsafe { w.bits(LOCKED) });
     }
 }

@@ -1,59 +1,49 @@
-//! The board program for the STM32H743, a Cortex-M7: the second board, to show what a port takes.
+//! The board program for the STM32H743, a Cortex-M7: the second board, which shows what a port needs.
 //!
-//! It links and has run on nothing yet. Pins and speeds are those of the first board; the core runs on its 64 MHz
-//! internal oscillator from the start, so there are no clocks to bring up, and its caches stay off.
+//! It links; it has not run on hardware. Serial pins and baud rates are those of the first board, the LED is on PB0
+//! (lit when high), the inhibit input on PC6 (low permits). The core runs on its 64 MHz internal oscillator, so there
+//! are no clocks to start; its caches stay off.
 #![no_std]
 #![no_main]
 #![warn(missing_docs)]
 
 mod flash;
-mod lines;
+mod serial;
 
-use crate::flash::ParameterSectors;
+use crate::flash::Controller;
 use cortex_m_rt::entry;
-use gleaner_cortex_m::bare::{self, Board};
-use gleaner_cortex_m::{Cause, ResetFlags};
-use stm32h7::stm32h743::{IWDG, Peripherals, RCC};
+use embedded_hal::digital::PinState;
+use gleaner_cortex_m::bare::stm32::{Gpio, Input, Output, watchdog};
+use gleaner_cortex_m::bare::{self, SysTickDelay};
+use gleaner_cortex_m::{Board, Cause, Parts, ResetFlags};
+use stm32h7::stm32h743::{GPIOB, GPIOC, IWDG, Peripherals, RCC};
 
-/// RM0433, 8.7.2: the internal oscillator after a reset, for the core and all buses.
+/// RM0433, 8.7.2: the internal oscillator drives the core and all buses after a reset.
 const CLOCK_MHZ: u32 = 64;
 
-struct H743 {
-    flash: ParameterSectors,
-    reset_flags: ResetFlags,
-}
+struct H743;
 
 impl Board for H743 {
-    type Flash = ParameterSectors;
+    type Flash = Controller;
+    type Delay = SysTickDelay;
+    type Led = Output;
+    type Inhibit = Input;
 
-    fn flash(self) -> ParameterSectors {
-        self.flash
-    }
+    const LED_LIGHTS: PinState = PinState::High;
+    const INHIBIT_PERMITS: PinState = PinState::Low;
 
-    fn reset_flags(&self) -> ResetFlags {
-        self.reset_flags
-    }
-
-    /// RM0433, 46.3: prescaler 32 (code 3) and 1000 steps are a second of the 32 kHz oscillator.
     fn start_watchdog() {
-        watchdog().kr().write(|w| w.key().start());
-        watchdog().kr().write(|w| w.key().unlock());
-        watchdog().pr().write(|w| unsafe { w.bits(3) });
-        watchdog().rlr().write(|w| unsafe { w.bits(1000) });
-        H743::feed_watchdog();
+        // SAFETY: the address of the watchdog.
+        unsafe { watchdog::start(IWDG::ptr().cast()) }
     }
 
     fn feed_watchdog() {
-        watchdog().kr().write(|w| w.key().feed());
+        // SAFETY: as above.
+        unsafe { watchdog::feed(IWDG::ptr().cast()) }
     }
 }
 
-fn watchdog() -> &'static stm32h7::stm32h743::iwdg::RegisterBlock {
-    // SAFETY: nothing else touches these registers.
-    unsafe { &*IWDG::ptr() }
-}
-
-/// RM0433, 8.7.39. The flags are cleared, so that they tell of one reset only.
+/// RM0433, 8.7.39. Clears the flags, so that they describe one reset only.
 fn take_reset_flags(rcc: &RCC) -> ResetFlags {
     let rsr = rcc.rsr().read();
     let flags = ResetFlags {
@@ -64,14 +54,26 @@ fn take_reset_flags(rcc: &RCC) -> ResetFlags {
     flags
 }
 
+fn bring_up(core: cortex_m::Peripherals, chip: Peripherals) -> Parts<H743> {
+    let reset_flags = take_reset_flags(&chip.RCC);
+    let delay = bare::start_clock(core.SYST, CLOCK_MHZ);
+    serial::start(&chip, CLOCK_MHZ * 1_000_000);
+    // SAFETY: ports whose clocks the serial lines have enabled; only they use other pins of them.
+    let [port_b, port_c] = unsafe { [Gpio::new(GPIOB::ptr().cast()), Gpio::new(GPIOC::ptr().cast())] };
+    Parts {
+        reset_flags,
+        flash: Controller::new(chip.FLASH),
+        delay,
+        led: port_b.output(0),
+        inhibit: port_c.input(6),
+    }
+}
+
 #[entry]
 fn main() -> ! {
-    // Both are there once; without them there is no board to run on.
-    let (Some(core), Some(chip)) = (cortex_m::Peripherals::take(), Peripherals::take()) else {
-        bare::end(Cause::Panic { line: line!() })
-    };
-    let reset_flags = take_reset_flags(&chip.RCC);
-    bare::start_clock(core.SYST, CLOCK_MHZ);
-    lines::start(&chip, CLOCK_MHZ * 1_000_000);
-    bare::fly(H743 { flash: ParameterSectors::new(chip.FLASH), reset_flags })
+    match (cortex_m::Peripherals::take(), Peripherals::take()) {
+        (Some(core), Some(chip)) => bare::fly(bring_up(core, chip)),
+        // Only a second call could find them taken.
+        _ => bare::end(Cause::Panic { line: line!() }),
+    }
 }

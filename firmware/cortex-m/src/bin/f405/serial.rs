@@ -1,9 +1,10 @@
-//! The three serial lines: pins, speeds, interrupts.
+//! The three serial lines: pins, baud rates, interrupts.
 
 use cortex_m::peripheral::NVIC;
+use gleaner_cortex_m::bare::stm32::Gpio;
 use gleaner_cortex_m::bare::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
 use gleaner_cortex_m::{LineFault, Uart};
-use stm32f4::stm32f405::{Interrupt, Peripherals, UART4, USART2, USART3, interrupt};
+use stm32f4::stm32f405::{GPIOA, GPIOB, GPIOC, Interrupt, Peripherals, UART4, USART2, USART3, interrupt};
 
 /// Alternate function of USART2 and USART3.
 const AF_USART_1_TO_3: u32 = 7;
@@ -14,19 +15,7 @@ const AF_UART4: u32 = 8;
 pub fn start(chip: &Peripherals, apb1_hz: u32) {
     chip.RCC.ahb1enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit());
     chip.RCC.apb1enr().modify(|_, w| w.usart2en().set_bit().usart3en().set_bit().uart4en().set_bit());
-    // RM0090, 8.4: mode 2 is "alternate function"; inputs are pulled up, so that an open line is silent.
-    chip.GPIOA
-        .afrl()
-        .modify(|r, w| unsafe { w.bits(r.bits() | AF_USART_1_TO_3 << 8 | AF_USART_1_TO_3 << 12) });
-    chip.GPIOA.pupdr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << 6) });
-    chip.GPIOA.moder().modify(|r, w| unsafe { w.bits(r.bits() | 2 << 4 | 2 << 6) });
-    chip.GPIOB
-        .afrh()
-        .modify(|r, w| unsafe { w.bits(r.bits() | AF_USART_1_TO_3 << 8 | AF_USART_1_TO_3 << 12) });
-    chip.GPIOB.pupdr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << 22) });
-    chip.GPIOB.moder().modify(|r, w| unsafe { w.bits(r.bits() | 2 << 20 | 2 << 22) });
-    chip.GPIOC.afrh().modify(|r, w| unsafe { w.bits(r.bits() | AF_UART4 << 8) });
-    chip.GPIOC.moder().modify(|r, w| unsafe { w.bits(r.bits() | 2 << 20) });
+    give_pins();
 
     chip.USART2.brr().write(|w| unsafe { w.bits(divider(apb1_hz, LINK_BAUD)) });
     chip.USART2.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
@@ -35,8 +24,27 @@ pub fn start(chip: &Peripherals, apb1_hz: u32) {
     chip.UART4.brr().write(|w| unsafe { w.bits(divider(apb1_hz, LOG_BAUD)) });
     chip.UART4.cr1().write(|w| w.ue().set_bit().te().set_bit());
     for interrupt in [Interrupt::USART2, Interrupt::USART3, Interrupt::UART4] {
-        // SAFETY: the handlers below are ready, and nothing is guarded by these interrupts being off.
+        // SAFETY: the handlers below are ready, and no critical section relies on these interrupts being masked.
         unsafe { NVIC::unmask(interrupt) };
+    }
+}
+
+/// Gives the pins to the UARTs. Inputs are pulled up, so that an open line is idle.
+fn give_pins() {
+    // SAFETY: ports whose clocks are enabled; nothing else uses these pins.
+    let [a, b, c] = unsafe {
+        [Gpio::new(GPIOA::ptr().cast()), Gpio::new(GPIOB::ptr().cast()), Gpio::new(GPIOC::ptr().cast())]
+    };
+    a.pull_up(3);
+    b.pull_up(11);
+    for (port, pin, function) in [
+        (a, 2, AF_USART_1_TO_3),
+        (a, 3, AF_USART_1_TO_3),
+        (b, 10, AF_USART_1_TO_3),
+        (b, 11, AF_USART_1_TO_3),
+        (c, 10, AF_UART4),
+    ] {
+        port.alternate(pin, function);
     }
 }
 
@@ -55,22 +63,21 @@ fn gleaner_wake_log() {
     NVIC::pend(Interrupt::UART4);
 }
 
-/// The registers of USARTs and UARTs are alike, their types are not.
+/// USARTs and UARTs have the same registers but different types.
 macro_rules! uart {
     ($name:ident, $registers:ty) => {
         struct $name;
 
         impl $name {
             fn registers(&self) -> &'static <$registers as core::ops::Deref>::Target {
-                // SAFETY: after `start` only this line's interrupt touches the registers (and the end of the
-                // program, after which nothing else runs).
+                // SAFETY: after `start` only this line's interrupt uses the registers, and the end of the program.
                 unsafe { &*<$registers>::ptr() }
             }
         }
 
         impl Uart for $name {
             /// RM0090, 30.6.1: reading the status and then the data clears both the flags and the fault.
-            fn take(&mut self) -> Option<Result<u8, LineFault>> {
+            fn receive(&mut self) -> Option<Result<u8, LineFault>> {
                 let status = self.registers().sr().read();
                 let fault = status.ore().bit() || status.fe().bit() || status.nf().bit();
                 if !fault && status.rxne().bit_is_clear() {
@@ -88,11 +95,11 @@ macro_rules! uart {
                 self.registers().sr().read().txe().bit_is_set()
             }
 
-            fn give(&mut self, byte: u8) {
+            fn transmit(&mut self, byte: u8) {
                 self.registers().dr().write(|w| unsafe { w.bits(byte.into()) });
             }
 
-            fn call_for_more(&mut self, on: bool) {
+            fn interrupt_when_empty(&mut self, on: bool) {
                 self.registers().cr1().modify(|_, w| w.txeie().bit(on));
             }
         }
@@ -118,9 +125,9 @@ fn UART4() {
     LOG.serve(&mut LogUart);
 }
 
-/// Stops all transmitters: a fault ends the stream of setpoints before anything else.
+/// Stops all transmitters: after a fault, no further setpoint is sent.
 #[unsafe(no_mangle)]
-fn gleaner_silence() {
+fn gleaner_stop_transmitters() {
     LinkUart.registers().cr1().reset();
     RadioUart.registers().cr1().reset();
     LogUart.registers().cr1().reset();

@@ -1,8 +1,8 @@
-//! defmt on a serial port that never waits: a frame that finds no room is dropped whole and counted.
+//! defmt over a serial port that never blocks: a frame that does not fit is dropped as a whole and counted.
 #![allow(unsafe_code)]
 
-use super::lines::{LOG, gleaner_wake_log};
-use crate::{Journal, PortStats};
+use super::serial::{LOG, gleaner_wake_log};
+use crate::{EventLog, PortStats};
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicU32, Ordering};
 use critical_section::{CriticalSection, Mutex, RestoreState};
@@ -13,10 +13,10 @@ use heapless::Vec;
 
 /// The longest frame.
 const FRAME_BYTES: usize = 256;
-/// Frames dropped for want of room.
+/// Dropped frames.
 static DROPPED: AtomicU32 = AtomicU32::new(0);
 
-/// A frame while it is written. The critical section spans it, so that none is torn by an interrupt's.
+/// A frame that is being written. One critical section covers the whole frame, so that frames do not interleave.
 struct Writing {
     encoder: RefCell<Encoder>,
     frame: RefCell<Vec<u8, FRAME_BYTES>>,
@@ -34,9 +34,9 @@ static WRITING: Mutex<Writing> = Mutex::new(Writing {
 #[defmt::global_logger]
 struct Log;
 
-/// Runs `body` on the frame. Nothing else holds it: a critical section is on.
+/// Runs `body` on the frame. Callers hold the critical section.
 fn with(body: impl FnOnce(&Writing, &mut Encoder)) {
-    // SAFETY: only called between `acquire` and `release`, where the critical section is on.
+    // SAFETY: called only between `acquire` and `release`, inside the critical section.
     let section = unsafe { CriticalSection::new() };
     let writing = WRITING.borrow(section);
     if let Ok(mut encoder) = writing.encoder.try_borrow_mut() {
@@ -51,7 +51,7 @@ fn append(writing: &Writing, bytes: &[u8]) {
     }
 }
 
-// SAFETY: `acquire` turns interrupts off until `release`, so calls never nest and never overlap; defmt pairs them.
+// SAFETY: `acquire` disables interrupts until `release`, so calls neither nest nor overlap; defmt pairs them.
 unsafe impl defmt::Logger for Log {
     fn acquire() {
         // SAFETY: released in `release`, which defmt calls after each `acquire`.
@@ -80,7 +80,7 @@ unsafe impl defmt::Logger for Log {
                 }
             }
             if let Some(restore) = writing.restore.take() {
-                // SAFETY: the state that `acquire` got.
+                // SAFETY: the state that `acquire` returned.
                 unsafe { critical_section::release(restore) };
             }
         });
@@ -93,10 +93,10 @@ unsafe impl defmt::Logger for Log {
 
 defmt::timestamp!("{=u64:us}", super::now().as_micros());
 
-/// The journal of a board.
+/// The event log of a board.
 pub(super) struct Defmt;
 
-impl Journal for Defmt {
+impl EventLog for Defmt {
     fn state(&mut self, from: State, to: State) {
         defmt::info!("{=str} -> {=str}", from.name(), to.name());
     }

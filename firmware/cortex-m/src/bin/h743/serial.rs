@@ -1,14 +1,23 @@
-//! The three serial lines: pins, speeds, interrupts.
+//! The three serial lines: pins, baud rates, interrupts.
+
 use cortex_m::peripheral::NVIC;
+use gleaner_cortex_m::bare::stm32::Gpio;
 use gleaner_cortex_m::bare::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
 use gleaner_cortex_m::{LineFault, Uart};
-use stm32h7::stm32h743::{Interrupt, Peripherals, UART4, USART2, USART3, interrupt, usart1::RegisterBlock};
+use stm32h7::stm32h743::{
+    GPIOA, GPIOB, GPIOC, Interrupt, Peripherals, UART4, USART2, USART3, interrupt, usart1::RegisterBlock,
+};
+
+/// Alternate function of USART2 and USART3.
+const AF_USART_1_TO_3: u32 = 7;
+/// Alternate function of UART4.
+const AF_UART4: u32 = 8;
 
 const ENABLE: u32 = 1;
 const RECEIVE: u32 = 1 << 2;
 const TRANSMIT: u32 = 1 << 3;
-const CALL_WHEN_RECEIVED: u32 = 1 << 5;
-const CALL_WHEN_ROOM: u32 = 1 << 7;
+const INTERRUPT_ON_RECEIVED: u32 = 1 << 5;
+const INTERRUPT_ON_ROOM: u32 = 1 << 7;
 /// RM0433, 48.8.8: frame error, noise, overrun.
 const FAULTS: u32 = 0b1110;
 const OVERRUN: u32 = 1 << 3;
@@ -19,17 +28,8 @@ const ROOM: u32 = 1 << 7;
 pub fn start(chip: &Peripherals, bus_hz: u32) {
     chip.RCC.ahb4enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit());
     chip.RCC.apb1lenr().modify(|_, w| w.usart2en().set_bit().usart3en().set_bit().uart4en().set_bit());
-    // Alternate function 7 on PA2, PA3, PB10, PB11; 8 on PC10. After a reset the pins are analogue (mode 3), so mode
-    // 2 clears the lower bit. Inputs are pulled up, so that an open line is silent.
-    chip.GPIOA.afrl().modify(|r, w| unsafe { w.bits(r.bits() | 0x7700) });
-    chip.GPIOA.pupdr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << 6) });
-    chip.GPIOA.moder().modify(|r, w| unsafe { w.bits(r.bits() & !(1 << 4 | 1 << 6)) });
-    chip.GPIOB.afrh().modify(|r, w| unsafe { w.bits(r.bits() | 0x7700) });
-    chip.GPIOB.pupdr().modify(|r, w| unsafe { w.bits(r.bits() | 1 << 22) });
-    chip.GPIOB.moder().modify(|r, w| unsafe { w.bits(r.bits() & !(1 << 20 | 1 << 22)) });
-    chip.GPIOC.afrh().modify(|r, w| unsafe { w.bits(r.bits() | 0x800) });
-    chip.GPIOC.moder().modify(|r, w| unsafe { w.bits(r.bits() & !(1 << 20)) });
-    let both = ENABLE | RECEIVE | TRANSMIT | CALL_WHEN_RECEIVED;
+    give_pins();
+    let both = ENABLE | RECEIVE | TRANSMIT | INTERRUPT_ON_RECEIVED;
     let lines: [(&RegisterBlock, u32, u32); 3] = [
         (&chip.USART2, LINK_BAUD, both),
         (&chip.USART3, RADIO_BAUD, both),
@@ -40,8 +40,27 @@ pub fn start(chip: &Peripherals, bus_hz: u32) {
         registers.cr1().write(|w| unsafe { w.bits(control) });
     }
     for interrupt in [Interrupt::USART2, Interrupt::USART3, Interrupt::UART4] {
-        // SAFETY: the handlers below are ready, and nothing is guarded by these interrupts being off.
+        // SAFETY: the handlers below are ready, and no critical section relies on these interrupts being masked.
         unsafe { NVIC::unmask(interrupt) };
+    }
+}
+
+/// Gives the pins to the UARTs. Inputs are pulled up, so that an open line is idle.
+fn give_pins() {
+    // SAFETY: ports whose clocks are enabled; nothing else uses these pins.
+    let [a, b, c] = unsafe {
+        [Gpio::new(GPIOA::ptr().cast()), Gpio::new(GPIOB::ptr().cast()), Gpio::new(GPIOC::ptr().cast())]
+    };
+    a.pull_up(3);
+    b.pull_up(11);
+    for (port, pin, function) in [
+        (a, 2, AF_USART_1_TO_3),
+        (a, 3, AF_USART_1_TO_3),
+        (b, 10, AF_USART_1_TO_3),
+        (b, 11, AF_USART_1_TO_3),
+        (c, 10, AF_UART4),
+    ] {
+        port.alternate(pin, function);
     }
 }
 
@@ -60,14 +79,13 @@ struct Line(*const RegisterBlock);
 
 impl Line {
     fn registers(&self) -> &RegisterBlock {
-        // SAFETY: after `start` only this line's interrupt touches the registers (and the end of the program, after
-        // which nothing else runs).
+        // SAFETY: after `start` only this line's interrupt uses the registers, and the end of the program.
         unsafe { &*self.0 }
     }
 }
 
 impl Uart for Line {
-    fn take(&mut self) -> Option<Result<u8, LineFault>> {
+    fn receive(&mut self) -> Option<Result<u8, LineFault>> {
         let status = self.registers().isr().read().bits();
         if status & (RECEIVED | FAULTS) == 0 {
             return None;
@@ -85,13 +103,13 @@ impl Uart for Line {
         self.registers().isr().read().bits() & ROOM != 0
     }
 
-    fn give(&mut self, byte: u8) {
+    fn transmit(&mut self, byte: u8) {
         self.registers().tdr().write(|w| unsafe { w.bits(byte.into()) });
     }
 
-    fn call_for_more(&mut self, on: bool) {
-        let room = if on { CALL_WHEN_ROOM } else { 0 };
-        self.registers().cr1().modify(|r, w| unsafe { w.bits(r.bits() & !CALL_WHEN_ROOM | room) });
+    fn interrupt_when_empty(&mut self, on: bool) {
+        let room = if on { INTERRUPT_ON_ROOM } else { 0 };
+        self.registers().cr1().modify(|r, w| unsafe { w.bits(r.bits() & !INTERRUPT_ON_ROOM | room) });
     }
 }
 
@@ -110,9 +128,9 @@ fn UART4() {
     LOG.serve(&mut Line(stm32h7::stm32h743::UART4::ptr()));
 }
 
-/// Stops all transmitters: a fault ends the stream of setpoints before anything else.
+/// Stops all transmitters: after a fault, no further setpoint is sent.
 #[unsafe(no_mangle)]
-fn gleaner_silence() {
+fn gleaner_stop_transmitters() {
     for line in [USART2::ptr(), USART3::ptr(), UART4::ptr()] {
         Line(line).registers().cr1().reset();
     }

@@ -3,32 +3,32 @@
 
 use crate::{Endpoint, Port, PortStats};
 
-/// Speed of the line to the autopilot.
+/// Baud rate of the line to the autopilot.
 pub const LINK_BAUD: u32 = 921_600;
-/// Speed of the line to the radio.
+/// Baud rate of the line to the radio.
 pub const RADIO_BAUD: u32 = 115_200;
-/// Speed of the log.
+/// Baud rate of the log.
 pub const LOG_BAUD: u32 = 115_200;
 
-/// In: 22 ms of a line that is never silent. Out: three frames.
+/// Receive: 22 ms of a saturated line. Transmit: three frames.
 type LinkPort = Port<2048, 512>;
-/// In: 44 ms of a line that is never silent. The radio is not answered.
+/// Receive: 44 ms of a saturated line. Nothing is sent to the radio.
 type RadioPort = Port<512, 1>;
 
-/// To the autopilot.
+/// The port to the autopilot.
 pub static LINK: LinkPort = Port::new();
-/// To the radio.
+/// The port to the radio.
 pub static RADIO: RadioPort = Port::new();
-/// Of the log, which hears nothing.
+/// The port of the log, which receives nothing.
 pub static LOG: Port<1, 1024> = Port::new();
 
 unsafe extern "Rust" {
-    /// Makes the interrupt of the link's UART run soon. Each board defines it.
+    /// Sets the interrupt of the link's UART pending. Each board defines it.
     safe fn gleaner_wake_link();
     /// The same for the log's UART.
     pub(super) safe fn gleaner_wake_log();
-    /// Stops all transmitters. Each board defines it, with only register writes that cannot fail.
-    pub(super) safe fn gleaner_silence();
+    /// Stops all transmitters. Each board defines it with register writes only, so that it cannot fail.
+    pub(super) safe fn gleaner_stop_transmitters();
 }
 
 /// The program's end of the link.
@@ -37,12 +37,12 @@ pub(super) fn link()
     Endpoint::new(&LINK, || gleaner_wake_link())
 }
 
-/// The program's end of the radio's line.
+/// The program's end of the radio port.
 pub(super) fn radio() -> impl embedded_io::Read + embedded_io::ReadReady {
     Endpoint::new(&RADIO, || ())
 }
 
-/// Counters of link and radio.
+/// Counters of the link port and of the radio port.
 pub(super) fn losses() -> [PortStats; 2] {
     [LINK.stats(), RADIO.stats()]
 }
