@@ -7,3 +7,4 @@ pub mod board;
 pub mod observations;
 pub mod programs;
 pub mod python;
+pub mod sources;

@@ -73,7 +73,7 @@ impl<B: Board> Services<B> {
     pub fn poll<P: Policy>(&mut self, now: Instant, onboard: &mut Onboard<P>) -> bool {
         B::feed_watchdog();
         let state = onboard.state();
-        let _inhibited = self.panel.poll(now, state);
+        onboard.set_engage_inhibited(self.panel.poll(now, state));
         if let Some(notice) = self.saver.poll(now, onboard.parameters(), state) {
             onboard.say(notice.severity(), format_args!("{notice}"));
         }

@@ -36,6 +36,8 @@ pub struct Inputs<'a> {
     pub other_mode_seen: bool,
     /// Commands of ours that ended since the last poll, and whether the autopilot accepted them.
     pub ended: &'a [(AutopilotCommand, bool)],
+    /// Whether an input on the companion or board inhibits engaging, such as a remove-before-flight switch.
+    pub engage_inhibited: bool,
 }
 
 /// One line for the operator (`STATUSTEXT`).

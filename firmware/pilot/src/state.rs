@@ -94,6 +94,8 @@ pub enum Missing {
     Autopilot,
     /// A failsafe is latched.
     FailsafeClear,
+    /// The engage-inhibit input is active.
+    Permission,
     /// The estimator's origin is unknown.
     Origin,
     /// No position, or an old one.
@@ -125,6 +127,7 @@ impl Missing {
         match self {
             Missing::Autopilot => "no autopilot heard",
             Missing::FailsafeClear => "autopilot failsafe is set",
+            Missing::Permission => "engage inhibit input is active",
             Missing::Estimator => "estimator not healthy",
             Missing::Position => "no fresh position",
             Missing::Origin => "no estimator origin",
@@ -218,6 +221,7 @@ mod tests {
         let missing = [
             Missing::Autopilot,
             Missing::FailsafeClear,
+            Missing::Permission,
             Missing::Estimator,
             Missing::Position,
             Missing::Origin,

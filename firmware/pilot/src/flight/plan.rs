@@ -28,6 +28,9 @@ pub(crate) fn check(mission: &Mission, guard: &Guard, inputs: &Inputs<'_>) -> Re
     if vehicle.failsafe {
         return Err(Missing::FailsafeClear);
     }
+    if inputs.engage_inhibited {
+        return Err(Missing::Permission);
+    }
     let origin = vehicle.origin.ok_or(Missing::Origin)?;
     let position = vehicle.position.filter(Ned::is_finite).ok_or(Missing::Position)?;
     if !vehicle.ready {

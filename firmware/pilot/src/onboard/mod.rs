@@ -127,6 +127,7 @@ pub struct Onboard<P> {
     refused: Vec<(AutopilotCommand, bool), 2>,
     tunnel_refused: u32,
     inference_time: Option<Duration>,
+    engage_inhibited: bool,
     decision_taken: bool,
 }
 
@@ -164,6 +165,7 @@ impl<P: Policy> Onboard<P> {
             refused: Vec::new(),
             tunnel_refused: 0,
             inference_time: None,
+            engage_inhibited: false,
             decision_taken: true,
         }
     }
@@ -216,6 +218,7 @@ impl<P: Policy> Onboard<P> {
             request: told.request,
             other_mode_seen: told.other_mode_seen,
             ended: &told.ended,
+            engage_inhibited: self.engage_inhibited,
         };
         let out = self.machine.poll(now, &inputs, &mut self.policy);
         self.send(now, &out);
@@ -287,6 +290,12 @@ impl<P: Policy> Onboard<P> {
     /// How long the last inference took, measured by the program (a clock is an input); sent as `infer_us`.
     pub fn set_inference_time(&mut self, took: Duration) {
         self.inference_time = Some(took);
+    }
+
+    /// Blocks or permits engaging, for a switch on the aircraft. It does not end a mission that is already engaged: a
+    /// wire that breaks in flight changes nothing.
+    pub fn set_engage_inhibited(&mut self, inhibited: bool) {
+        self.engage_inhibited = inhibited;
     }
 
     /// One line for the operator from the program around the pilot, such as a port that went down; leaves with

@@ -70,6 +70,7 @@ pub struct Rig {
     pub request: Option<Request>,
     pub other_mode_seen: bool,
     pub ended: Vec<(AutopilotCommand, bool)>,
+    pub engage_inhibited: bool,
     /// Whether the autopilot accepts commands, or refuses them; `None`: no answer.
     pub accepts: Option<bool>,
     /// Whether the aircraft flies to its targets.
@@ -121,6 +122,7 @@ impl Rig {
             request: None,
             other_mode_seen: false,
             ended: Vec::new(),
+            engage_inhibited: false,
             accepts: Some(true),
             obeys: true,
             dropped: None,
@@ -176,6 +178,7 @@ impl Rig {
             request: self.request.take(),
             other_mode_seen: std::mem::take(&mut self.other_mode_seen),
             ended: &ended,
+            engage_inhibited: self.engage_inhibited,
         };
         let out = self.machine.poll(self.now, &inputs, &mut self.policy);
         let at_ms = self.now.as_millis();

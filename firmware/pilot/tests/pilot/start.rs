@@ -37,9 +37,10 @@ fn a_failed_self_test_refuses_every_request_for_good() {
 #[test]
 fn each_missing_condition_holds_the_start_back_and_is_told_once() {
     type Spoil = fn(&mut Rig);
-    let cases: [(Missing, Spoil); 13] = [
+    let cases: [(Missing, Spoil); 14] = [
         (Missing::Autopilot, |rig| rig.vehicle.mode = None),
         (Missing::FailsafeClear, |rig| rig.vehicle.failsafe = true),
+        (Missing::Permission, |rig| rig.engage_inhibited = true),
         (Missing::Origin, |rig| rig.vehicle.origin = None),
         (Missing::Position, |rig| rig.vehicle.position = None),
         (Missing::Position, |rig| rig.vehicle.position = Some(Ned { north_m: f32::NAN, ..Ned::default() })),
@@ -62,6 +63,14 @@ fn each_missing_condition_holds_the_start_back_and_is_told_once() {
         assert_eq!(rig.said(told), 1, "{missing:?}: {:?}", rig.texts);
         assert!(rig.setpoints.is_empty() && rig.commands.is_empty() && rig.policy.asked.is_empty());
     }
+}
+
+#[test]
+fn the_inhibit_input_does_not_end_an_engaged_mission() {
+    let mut rig = Rig::engaged();
+    rig.engage_inhibited = true;
+    rig.run(10.0);
+    assert_eq!(rig.state(), State::Engaged);
 }
 
 #[test]
