@@ -1,14 +1,16 @@
-//! Milliseconds of one update of each system, with its flights and its replay memory, least of a few rounds.
+//! CPU milliseconds of one update of each system, flights and replay included; minimum of five rounds.
 //!
 //!     cargo bench -p gleaner-host-trainer --bench systems_ms
 
 mod processor;
 
 use clap::Parser;
-use gleaner_host_trainer::learn::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
-use gleaner_host_trainer::learn::learning::Learning;
-use gleaner_host_trainer::learn::run::Run;
-use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::env::site::Site;
+use gleaner_host_trainer::learn::algorithm::Algorithm;
+use gleaner_host_trainer::learn::run::OffPolicyRun;
+use gleaner_host_trainer::learn::trainer::Trainer;
+use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::systems::{DdqnCgl, Gleaner, MosacAtt, MosacCgl, MosacFtv, System};
 use processor::cpu_ms;
 use std::path::Path;
 
@@ -22,10 +24,11 @@ struct Command {
     settings: Settings,
 }
 
-fn measure<L: Learner>() {
+fn measure<A: Algorithm>() {
     let settings = Command::parse_from(["bench", "--warm-up", "1000"]).settings;
     let nowhere = Path::new("/nonexistent");
-    let mut run = Run::<L>::open(settings, nowhere).expect("the default city has room");
+    let mut run =
+        OffPolicyRun::<A>::open(settings, Site::default_site(), nowhere).expect("the default city has room");
     for _ in 0..WARM_UP {
         run.advance().expect("the default city has room");
     }
@@ -38,7 +41,7 @@ fn measure<L: Learner>() {
         let spent = cpu_ms().zip(before).map_or(f64::NAN, |(after, before)| after - before);
         least = least.min(spent / UPDATES_A_ROUND as f64);
     }
-    let system = L::SYSTEM;
+    let system: System = A::NAME.parse().expect("an algorithm has a system");
     println!(
         "{:<10} {:>7} parameters  cpu_ms {least:.2} an update",
         system.title(),

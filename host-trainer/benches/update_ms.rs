@@ -1,5 +1,5 @@
-//! Milliseconds of one update, least of a few rounds, as one line that a script can read. The
-//! command is `python3 host-trainer/scripts/compare_with_pytorch.py`.
+//! CPU milliseconds of one update, the minimum of several rounds, in one line for a script. The command is
+//! `python3 host-trainer/scripts/compare_with_pytorch.py`.
 
 mod processor;
 mod twin;
@@ -28,7 +28,7 @@ fn main() {
             least_cpu = least_cpu.min((after - before) * each);
         }
     }
-    // Printed so that no part of the work can be left out.
+    // Printed so that the compiler cannot remove the computation.
     let sum: f32 = learner.actor.parameters.iter().sum();
     println!("gleaner cpu_ms {least_cpu:.2} wall_ms {least_wall:.2} (sum of parameters {sum:.4})");
 }

@@ -1,25 +1,32 @@
-//! Learns, evaluates and exports policies: multi-objective soft actor-critic with the attention network
-//! (MOSAC-ATT, `paper`, section IV), and the systems that the paper compares it with.
+//! Trains, evaluates and exports policies: multi-objective soft actor-critic with attention (MOSAC-ATT, `paper`, section
+//! IV), the systems that the paper compares it with, and the way to the shipped policy.
 //!
 //! # Glossary
-//! - **flight**: an episode of the world with the guard on, under one preference.
-//! - **reward**: percent of the data and minus battery units, always as a vector.
-//! - **update**: one gradient step of all networks on one batch; **step**: one slot of one flight.
-//! - **temperature**: two of them, as in the paper: nu weighs the entropy in the objectives, tau heats the softmax
-//!   that explores.
-//! - **system**: a learning algorithm with an **encoding**, which is how it sees a state and what it remembers of it.
-//! - **realization**: devices drawn for a scenario; evaluation realizations are never trained on.
+//! - **flight**: an episode of the world under the safety envelope and one preference.
+//! - **reward**: percent of the data, and minus battery units; always a vector.
+//! - **step** (environment step): one slot of one flight. **update**: one gradient step of all networks on one batch.
+//! - **entropy coefficient** nu: weight of the entropy in the objective. **temperature** tau: divisor of the logits in the
+//!   exploring softmax.
+//! - **encoding**: what a system observes of a flight and stores of a state. **system**: an algorithm with an encoding.
+//! - **realization**: a scenario with its devices drawn. Evaluation realizations are never trained on.
+//! - **snapshot**: the parameters of a policy with the settings that trained them. **checkpoint**: everything that the
+//!   next update depends on.
 //!
-//! # How it hangs together
-//! `train` reads top to bottom; what it calls lives beside it: [`env::flight`] and [`observe::encoding`] make samples,
-//! [`learn::replay`] keeps them, [`learn::mosac`] or [`learn::ddqn`] learns from them (what the loop asks of either is [`learn::learner`]),
-//! [`judge::validation`] and [`judge::evaluation`] judge, [`keep::checkpoint`] survives a kill, [`keep::snapshot`] is what is left, [`export`]
-//! writes the model. The networks themselves are [`net`]; [`systems`] lists what can be trained.
+//! # Modules
+//! | module | contents | uses |
+//! |---|---|---|
+//! | [`net`] | networks: forward and backward passes, Adam | - |
+//! | [`env`] | missions and flights | - |
+//! | [`settings`] | hyper-parameters and presets | `env` |
+//! | [`observe`] | encodings | `net`, `env` |
+//! | [`keep`] | checkpoints, snapshots, learning curves | `settings` |
+//! | [`planner`] | the teacher, the oracle and the proven bound: planners with full knowledge | `env` |
+//! | [`judge`] | metrics, validation, the paper's settings | all above |
+//! | [`learn`] | MOSAC, DDQN, distillation, refinement | all above |
+//! | [`systems`] | the systems by name | `learn`, `judge` |
+//! | [`export`], [`report`] | ONNX models, the report | `net`, `judge` |
 //!
-//! The policies that fly come another way: [`learn::distil`] copies the [`planner::teacher`], who knows what the aircraft cannot see,
-//! and [`learn::ppo`] lets the pupil learn from its own flights. What one loop asks of all three ways is [`learn::learning`]. What
-//! they are measured against is the [`planner::oracle`]: the best tour that the [`planner`] finds for someone who knows
-//! everything, and a proven bound on what anyone can have.
+//! The shipped policy is made by [`learn::distil`] from the planner and then by [`learn::ppo`] from its own flights.
 
 pub mod env;
 pub mod export;
@@ -30,4 +37,5 @@ pub mod net;
 pub mod observe;
 pub mod planner;
 pub mod report;
+pub mod settings;
 pub mod systems;

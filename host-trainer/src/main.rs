@@ -1,18 +1,22 @@
-//! `gleaner-train`: learns, evaluates and exports policies.
+//! `gleaner-train`: trains, evaluates and exports policies.
 
 mod cli;
 
-use clap::Parser;
 use std::process::ExitCode;
 
+/// The command could not run.
+const FAILED: u8 = 2;
+/// Ctrl-C stopped it (128 + SIGINT).
+const INTERRUPTED: u8 = 130;
+
 fn main() -> ExitCode {
-    // `evaluate | head` ends quietly.
+    // `evaluate | head` ends without an error.
     sigpipe::reset();
-    match cli::run(&cli::Arguments::parse()) {
+    match cli::run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("gleaner-train: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if error.is::<cli::Interrupted>() { INTERRUPTED } else { FAILED })
         }
     }
 }

@@ -5,7 +5,7 @@ use gleaner_units::BatteryUnits;
 use gleaner_world::{ScenarioKind, World};
 use std::sync::Arc;
 
-/// Scenario, K, B, percent of the data in the calibration that settled the world's constants.
+/// Scenario, K, B, percent of the data in the calibration of the world's constants.
 const CALIBRATION: [(ScenarioKind, usize, f32, f32); 10] = [
     (ScenarioKind::ReachDestination, 3, 80.0, 93.2),
     (ScenarioKind::ReturnBase, 3, 80.0, 87.9),
@@ -20,7 +20,7 @@ const CALIBRATION: [(ScenarioKind, usize, f32, f32); 10] = [
 ];
 
 #[test]
-fn greedy_collects_what_the_calibration_says() {
+fn greedy_matches_the_calibration() {
     let world = Arc::new(World::default_world());
     for (kind, devices, battery, expected) in CALIBRATION {
         let scenario = kind.scenario().with_devices(devices).with_battery(BatteryUnits(battery));

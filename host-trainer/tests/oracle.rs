@@ -1,4 +1,4 @@
-//! The oracle plans what can be flown, and better than anyone who knows less.
+//! The oracle: its plans can be flown, and they are better than GREEDY.
 
 use gleaner_host_trainer::judge::evaluation::{evaluate_greedy, realizations, test_preferences};
 use gleaner_host_trainer::planner::oracle::{OracleSetting, Thoroughness, consult};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 const QUICK: Thoroughness = Thoroughness { tours: 4_000 };
 
 #[test]
-fn it_beats_greedy_and_flies_the_shortest_way_for_energy_alone() {
+fn oracle_beats_greedy_and_flies_the_shortest_way() {
     let world = Arc::new(World::default_world());
     let rates = Rates::new(Arc::clone(&world));
     for (kind, least) in [(ScenarioKind::ReachDestination, 32.0), (ScenarioKind::ReturnBase, 2.0)] {
@@ -33,7 +33,7 @@ fn it_beats_greedy_and_flies_the_shortest_way_for_energy_alone() {
 }
 
 #[test]
-fn every_tour_can_be_flown_whatever_the_search_comes_up_with() {
+fn every_tour_of_the_search_can_be_flown() {
     let world = Arc::new(World::default_world());
     let rates = Rates::new(Arc::clone(&world));
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -44,7 +44,7 @@ fn every_tour_can_be_flown_whatever_the_search_comes_up_with() {
         let realization = Realization::draw(world.city(), &scenario, Seed::training(number)).unwrap();
         let (known, state) = (rates.study(&realization), State::start(&realization));
         let problem = Problem { known: &known, state: &state, w_data: 0.9 };
-        // Hot to the end, so that the tour is whatever came last.
+        // A high temperature to the end gives an arbitrary tour.
         let hot = Effort { tours: 300, temperatures: [1e6, 1e6] };
         for tour in [problem.anneal(Tour::default(), hot, &mut rng).1, Tour::default()] {
             let mut end = state;
@@ -59,8 +59,8 @@ fn every_tour_can_be_flown_whatever_the_search_comes_up_with() {
 }
 
 #[test]
-fn what_is_planned_is_what_comes_of_it_in_the_mean() {
-    // The mean over many draws of the shadowing, action by action.
+fn planned_data_is_the_mean_of_flown_data() {
+    // The mean over many draws of the shadowing, slot by slot.
     let world = Arc::new(World::default_world());
     let rates = Rates::new(Arc::clone(&world));
     let scenario = ScenarioKind::ReachDestination.scenario().with_devices(1);
@@ -81,16 +81,16 @@ fn command(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_gleaner-train")).arg("oracle").args(arguments).output().unwrap()
 }
 
-/// The one line that a command says that was refused.
+/// The one-line error of a refused command.
 fn refused(output: Output) -> String {
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-    said
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    message
 }
 
 #[test]
-fn a_file_of_plans_gets_its_bounds_later_and_keeps_its_plans() {
+fn bounds_can_be_added_to_a_file_of_plans() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("oracle.jsonl");
     let file = path.to_str().unwrap();
@@ -106,8 +106,8 @@ fn a_file_of_plans_gets_its_bounds_later_and_keeps_its_plans() {
 
     let output = command(&[&quick[..], &["--bound", "3"]].concat());
     assert!(output.status.success());
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(said.matches("can be had").count(), 10, "{said}");
+    let message = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(message.matches("upper bound").count(), 10, "{message}");
     let bounded = settings();
     for (before, after) in planned.iter().zip(&bounded) {
         assert_eq!(
@@ -119,24 +119,24 @@ fn a_file_of_plans_gets_its_bounds_later_and_keeps_its_plans() {
             assert!((most - 1e-3..=100.0).contains(bound), "{bound} % is proven and {most} % planned");
         }
     }
-    // A smaller effort is no reason to do it again.
+    // A smaller effort computes nothing again.
     assert!(command(&[&quick[..], &["--bound", "2"]].concat()).status.success());
     assert_eq!(settings(), bounded);
 }
 
 #[test]
-fn a_damaged_file_is_refused_and_left_as_it_is() {
+fn damaged_file_is_refused_and_kept() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("oracle.jsonl");
     fs::write(&path, "{\"scenario\":\"rd\"").unwrap();
-    let said = refused(command(&["--out", path.to_str().unwrap(), "--realizations", "1", "--tours", "1"]));
-    assert!(said.contains("line 1 is not what"), "{said}");
+    let message = refused(command(&["--out", path.to_str().unwrap(), "--realizations", "1", "--tours", "1"]));
+    assert!(message.contains("line 1 is not a line of"), "{message}");
     assert_eq!(fs::read_to_string(&path).unwrap(), "{\"scenario\":\"rd\"");
 }
 
 #[test]
-fn more_devices_than_the_planner_takes_are_refused() {
+fn too_many_devices_are_refused() {
     let asked = ["evaluate", "--devices", "13", "--realizations", "1", "--oracle", "1"];
-    let said = refused(Command::new(env!("CARGO_BIN_EXE_gleaner-train")).args(asked).output().unwrap());
-    assert!(said.contains("at most 12"), "{said}");
+    let message = refused(Command::new(env!("CARGO_BIN_EXE_gleaner-train")).args(asked).output().unwrap());
+    assert!(message.contains("at most 12"), "{message}");
 }

@@ -1,8 +1,8 @@
 //! The networks against PyTorch: outputs, attention, losses, gradients and parameters after three steps of Adam.
 //!
-//! The frozen numbers come from `scripts/pytorch_fixture.py` and, for the networks that the paper compares with,
-//! `scripts/pytorch_fixture_baselines.py`, which say how to make them anew. Parameters and inputs are drawn here by
-//! the same generator.
+//! The frozen numbers come from `scripts/pytorch_fixture.py` and, for the networks of the paper's baselines, from
+//! `scripts/pytorch_fixture_baselines.py`. Both scripts say how to run them. Parameters and inputs are drawn here by the
+//! same generator.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -106,8 +106,8 @@ fn assert_close(what: &str, ours: &[f32], torch: &[f32], tolerance: f32) {
     }
 }
 
-/// The biases of the keys: they move all scores of a query alike, so their true gradient is 0 and Adam blows up
-/// whatever rounding leaves of it.
+/// The biases of the keys. They shift all scores of a query equally, so their gradient is 0, and Adam amplifies the
+/// rounding errors.
 fn key_biases(shape: Shape) -> Vec<Range<usize>> {
     let tensors = shape.tensors().into_iter().filter(|tensor| tensor.name.ends_with("qkv.bias"));
     tensors.map(|tensor| tensor.offset + 64..tensor.offset + 128).collect()
@@ -169,11 +169,11 @@ fn critic_agrees_with_pytorch() {
 }
 
 #[test]
-fn the_paper_s_actor_agrees_with_pytorch() {
+fn paper_actor_agrees_with_pytorch() {
     agrees_with_pytorch::<100, 5>("paper", Shape::paper(5));
 }
 
-/// `draw` packs the states; the preferences and the targets are drawn after them.
+/// `draw` packs the states. Preferences and targets are drawn after them.
 fn baseline_agrees_with_pytorch<N: Architecture>(
     name: &str,
     network: N,
@@ -232,7 +232,7 @@ fn baseline_agrees_with_pytorch<N: Architecture>(
     assert_close("parameters after", &strided(&parameters), torch, 2e-5);
 }
 
-/// So many preferences for each state, drawn for all states together.
+/// This number of preferences for each state, drawn for all states together.
 fn preferences(generator: &mut Generator, copies: &[usize]) -> Vec<Vec<[f32; 2]>> {
     let all = generator.numbers(2 * copies.iter().sum::<usize>());
     let mut rest = all.as_chunks::<2>().0;

@@ -1,18 +1,20 @@
-//! Refinement learns from its own flights, and a kill costs it nothing but the time since the last checkpoint.
+//! Refinement: it learns, resumes without a difference, and starts from the mean of several runs.
 
 use clap::Parser;
+use gleaner_host_trainer::env::flight::Flight;
+use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::env::variety::Variety;
-use gleaner_host_trainer::keep::snapshot::LAST;
-use gleaner_host_trainer::keep::snapshot::Learned;
-use gleaner_host_trainer::learn::learning::Learning;
+use gleaner_host_trainer::keep::snapshot::{LAST, Snapshot};
 use gleaner_host_trainer::learn::ppo::Refinement;
-use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::learn::trainer::Trainer;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::systems::System;
+use gleaner_host_trainer::settings::Settings;
+use gleaner_policy::Preference;
 use gleaner_units::Action;
-use gleaner_world::World;
+use gleaner_world::{Realization, ScenarioKind, Seed, World};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::path::Path;
 use std::sync::Arc;
 
 #[derive(Parser)]
@@ -27,9 +29,9 @@ fn settings(more: &[&str]) -> Settings {
     Command::parse_from(usual.iter().chain(more)).settings
 }
 
-fn untrained() -> Learned {
-    Learned {
-        system: System::Gleaner,
+fn untrained() -> Snapshot {
+    Snapshot {
+        system: "gleaner".into(),
         method: "train".into(),
         settings: settings(&[]),
         actor: Shape::actor().initialise(&mut ChaCha8Rng::seed_from_u64(3)),
@@ -39,37 +41,41 @@ fn untrained() -> Learned {
     }
 }
 
+fn open(folder: &Path, first: &Snapshot, others: &[Snapshot]) -> Refinement {
+    Refinement::open(settings(&[]), Site::default_site(), folder, first, others, 1.0).unwrap()
+}
+
 #[test]
-fn resuming_gives_the_same_bits_as_never_having_stopped() {
+fn resumed_refinement_equals_an_uninterrupted_one() {
     let (from, folder) = (untrained(), tempfile::tempdir().unwrap());
-    let open = || Refinement::open(settings(&[]), folder.path(), &from, &[], 1.0).unwrap();
-    let mut through = open();
-    let findings: Vec<_> = (0..4).map(|_| through.advance().unwrap()).collect();
+    let mut through = open(folder.path(), &from, &[]);
+    let losses: Vec<_> = (0..4).map(|_| through.advance().unwrap()).collect();
     assert!(through.is_done());
 
-    let mut stopped = open();
+    let mut stopped = open(folder.path(), &from, &[]);
     stopped.advance().unwrap();
     stopped.advance().unwrap();
     stopped.save(folder.path()).unwrap();
     stopped.advance().unwrap(); // lost in the kill
     drop(stopped);
-    let mut resumed = open();
+    let mut resumed = open(folder.path(), &from, &[]);
     assert_eq!(resumed.update(), 2);
     let after: Vec<_> = (0..2).map(|_| resumed.advance().unwrap()).collect();
-    assert_eq!(after, findings[2..], "losses to the last bit");
+    assert_eq!(after, losses[2..], "losses to the last bit");
+    // The critic learns the returns of an untrained policy within four updates.
+    let (first, last) = (losses[0].critic, losses[3].critic);
+    assert!(last < 0.85 * first, "squared error {first} at first, {last} after 4 updates");
 }
 
 #[test]
-fn it_begins_in_the_middle_of_several_and_leaves_where_it_stands() {
+fn start_is_the_mean_of_several_runs() {
     let (first, folder) = (untrained(), tempfile::tempdir().unwrap());
-    let with = |by: f32| {
+    let shifted = |by: f32| {
         let actor = first.actor.iter().map(|weight| weight + by).collect();
-        Learned { actor, ..first.clone() }
+        Snapshot { actor, ..first.clone() }
     };
-    let mut run =
-        Refinement::open(settings(&[]), folder.path(), &first, &[with(0.25), with(0.5)], 1.0).unwrap();
-    run.save(folder.path()).unwrap();
-    let last = Learned::load(&folder.path().join(LAST)).unwrap().unwrap();
+    open(folder.path(), &first, &[shifted(0.25), shifted(0.5)]).save(folder.path()).unwrap();
+    let last = Snapshot::load(&folder.path().join(LAST)).unwrap().unwrap();
     for (weight, one) in last.actor.iter().zip(&first.actor) {
         assert!((weight - (one + 0.25)).abs() < 1e-6, "{weight}, {one}");
     }
@@ -77,63 +83,48 @@ fn it_begins_in_the_middle_of_several_and_leaves_where_it_stands() {
 }
 
 #[test]
-fn the_critic_learns_what_a_mission_brings() {
-    let from = untrained();
-    let folder = tempfile::tempdir().unwrap();
-    let mut run = Refinement::open(settings(&[]), folder.path(), &from, &[], 1.0).unwrap();
-    let first = run.advance().unwrap().critic;
-    run.advance().unwrap();
-    run.advance().unwrap();
-    let last = run.advance().unwrap().critic;
-    assert!(last < 0.85 * first, "squared error {first} at first, {last} after 4 updates");
-}
-
-#[test]
-fn other_cities_are_drawn_as_often_as_asked_and_always_the_same() {
-    let world = Arc::new(World::default_world());
-    let variety = Variety::new(&world, &settings(&["--share-cities", "0.25"]));
-    let elsewhere = |mission| !Arc::ptr_eq(variety.setting(mission).world, &world);
-    let count = (0..2_000).filter(|&mission| elsewhere(mission)).count();
+fn generated_cities_come_in_their_share_and_repeat() {
+    let site = Site::default_site();
+    let variety = Variety::new(&site, 0.25);
+    let is_generated = |mission| variety.setting(mission).index > 0;
+    let count = (0..2_000).filter(|&mission| is_generated(mission)).count();
     assert!((420..580).contains(&count), "{count} of 2000");
-    for mission in (0..200).filter(|&mission| elsewhere(mission)) {
+    for mission in (0..200).filter(|&mission| is_generated(mission)) {
         let setting = variety.setting(mission);
         assert!(setting.reports_missing > 0.0);
-        assert!(Arc::ptr_eq(setting.world, variety.setting(mission).world));
-        // Default start and terminal are moved to open ground.
-        settings(&[]).mission(setting.world, mission).unwrap();
+        assert_eq!(setting.index, variety.setting(mission).index);
+        // The default start and terminal move to open ground.
+        settings(&[]).missions().mission(setting.site, mission).unwrap();
     }
-    let usual = Variety::new(&world, &settings(&[]));
-    assert!((0..200).all(|mission| Arc::ptr_eq(usual.setting(mission).world, &world)));
+    let default_only = Variety::new(&site, 0.0);
+    assert!((0..200).all(|mission| default_only.setting(mission).index == 0));
 }
 
 #[test]
-fn a_missing_report_leaves_the_device_unheard_and_its_data_as_last_told() {
-    use gleaner_host_trainer::env::flight::Flight;
-    use gleaner_policy::Preference;
-    use gleaner_world::{Realization, ScenarioKind, Seed};
+fn lost_report_leaves_the_last_known_data() {
     let world = Arc::new(World::default_world());
     let scenario = ScenarioKind::ReachDestination.scenario();
     let seed = Seed::training(11);
     let realization = Realization::draw(world.city(), &scenario, seed).unwrap();
     let mut flight =
         Flight::new(&world, &realization, seed, Preference::DATA).unwrap().with_reports_missing(0.5, seed);
-    let (mut missing, mut slots) = (0, 0);
-    let mut told: Vec<f32> = realization.devices().iter().map(|device| device.data_units).collect();
+    let (mut lost, mut slots) = (0, 0);
+    let mut known: Vec<f32> = realization.devices().iter().map(|device| device.data_units).collect();
     while !flight.is_over() {
         let tokens = flight.tokens();
-        assert_eq!(tokens, flight.tokens(), "asking twice hears the same");
+        assert_eq!(tokens, flight.tokens(), "observing twice gives the same");
         for (index, (token, device)) in tokens.devices.iter().zip(flight.episode().devices()).enumerate() {
             slots += 1;
             if token[3] == device.snr.0 {
-                told[index] = device.remaining_units;
+                known[index] = device.remaining_units;
             } else {
-                missing += 1;
-                assert_eq!(token[4], 0.0, "not heard, so not reachable");
+                lost += 1;
+                assert_eq!(token[4], 0.0, "a device without a report is not reachable");
             }
-            assert_eq!(token[2], told[index]);
+            assert_eq!(token[2], known[index]);
         }
         let action = flight.guard().homeward(flight.episode().uav()).filter(|_| slots > 300);
         flight.step(action.unwrap_or(Action::Hover));
     }
-    assert!((0.4..0.6).contains(&(f64::from(missing) / f64::from(slots))), "{missing} of {slots}");
+    assert!((0.4..0.6).contains(&(f64::from(lost) / f64::from(slots))), "{lost} of {slots}");
 }

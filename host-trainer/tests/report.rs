@@ -1,10 +1,10 @@
-//! The report as a program: one page that needs nothing else, CSV files, parts that are kept, and bad input refused.
+//! The report command: one self-contained page, CSV files, parts that are kept, and bad input refused.
 
 use clap::Parser;
-use gleaner_host_trainer::learn::run::{CURVE, Learned};
-use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::keep::curves::CURVE;
+use gleaner_host_trainer::keep::snapshot::Snapshot;
 use gleaner_host_trainer::net::Shape;
-use gleaner_host_trainer::systems::System;
+use gleaner_host_trainer::settings::Settings;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::fs;
@@ -17,10 +17,10 @@ struct Defaults {
     settings: Settings,
 }
 
-/// A run that has learned nothing, and whose curve has one point.
+/// An untrained run with one point in its curve.
 fn run_folder(folder: &Path) {
-    let learned = Learned {
-        system: System::Gleaner,
+    let learned = Snapshot {
+        system: "gleaner".into(),
         method: "train".into(),
         settings: Defaults::parse_from(["train"]).settings,
         actor: Shape::actor().initialise(&mut ChaCha8Rng::seed_from_u64(1)),
@@ -38,14 +38,14 @@ fn report(arguments: &[&str]) -> Output {
 
 fn refused(arguments: &[&str]) -> String {
     let output = report(arguments);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-    said
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    message
 }
 
 #[test]
-fn one_command_makes_the_page_and_its_numbers_and_a_second_one_reuses_them() {
+fn report_makes_page_and_csv_and_reuses_its_parts() {
     let folder = tempfile::tempdir().unwrap();
     let (run, out) = (folder.path().join("run"), folder.path().join("out"));
     fs::create_dir(&run).unwrap();
@@ -61,7 +61,7 @@ fn one_command_makes_the_page_and_its_numbers_and_a_second_one_reuses_them() {
     fs::write(&oracle, format!("{line}\n")).unwrap();
     let arguments = [
         "--run",
-        &format!("nobody={}", run.display()),
+        &format!("untrained={}", run.display()),
         "--oracle",
         oracle.to_str().unwrap(),
         "--realizations",
@@ -78,7 +78,8 @@ fn one_command_makes_the_page_and_its_numbers_and_a_second_one_reuses_them() {
     for outside in ["http://", "https://", "<script", "<link", "src=", "url("] {
         assert!(!page.contains(outside), "the page asks for {outside}");
     }
-    for shown in ["nobody", "GREEDY", "ORACLE", "97.2", "about 87", "not computed", "87.49 ± 0.16", "5000"] {
+    for shown in ["untrained", "GREEDY", "ORACLE", "97.2", "about 87", "not computed", "87.49 ± 0.16", "5000"]
+    {
         assert!(page.contains(shown), "{shown} is not on the page");
     }
     let lines = |name: &str| fs::read_to_string(out.join(name)).unwrap().lines().count() - 1;
@@ -89,14 +90,14 @@ fn one_command_makes_the_page_and_its_numbers_and_a_second_one_reuses_them() {
     assert_eq!((lines("engines.csv"), lines("curves.csv")), (2, 1));
     assert!(lines("trajectories.csv") > 6 && lines("published.csv") > 20);
 
-    // Nothing is measured again, but for a part that was damaged: then it is said, and the numbers are the same.
+    // Only a damaged part is measured again, with a message and the same numbers.
     let metrics = fs::read(out.join("metrics.csv")).unwrap();
     let part = fs::read_dir(out.join("parts")).unwrap().next().unwrap().unwrap().path();
     fs::write(&part, "no part").unwrap();
     let output = report(&arguments);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && said.contains("damaged part, measured again"), "{said}");
-    assert_eq!(said.lines().count(), 1, "{said}");
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && message.contains("damaged part, measured again"), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
     assert!(metrics == fs::read(out.join("metrics.csv")).unwrap());
 }
 
@@ -108,13 +109,13 @@ fn bad_input_is_refused_in_one_line() {
     let (file, nowhere) = (file.to_str().unwrap(), folder.path().join("nowhere"));
     let (empty, out) = (folder.path().to_str().unwrap(), folder.path().join("out"));
     let out = ["--out", out.to_str().unwrap()];
-    let said = |arguments: &[&str]| refused(&[arguments, &out[..]].concat());
-    assert!(said(&["--run", nowhere.to_str().unwrap()]).contains("no such folder"));
-    assert!(said(&["--run", empty]).contains("no run has been validated here yet"));
-    assert!(said(&["--model", file]).contains("not an ONNX model"));
-    assert!(said(&["--oracle", file, "--run", empty]).contains("no run has been validated here yet"));
-    assert!(said(&["--realizations", "0"]).contains("nothing to fly"));
+    let message_of = |arguments: &[&str]| refused(&[arguments, &out[..]].concat());
+    assert!(message_of(&["--run", nowhere.to_str().unwrap()]).contains("no such folder"));
+    assert!(message_of(&["--run", empty]).contains("no parameters yet"));
+    assert!(message_of(&["--model", file]).contains("not an ONNX model"));
+    assert!(message_of(&["--oracle", file, "--run", empty]).contains("no parameters yet"));
+    assert!(message_of(&["--realizations", "0"]).contains("no mission to fly"));
     run_folder(folder.path());
-    assert!(said(&["--oracle", file, "--run", empty]).contains("line 1 is not what"));
-    assert!(said(&["--run", empty, "--run", empty]).contains("tell them apart"));
+    assert!(message_of(&["--oracle", file, "--run", empty]).contains("line 1 is not a line"));
+    assert!(message_of(&["--run", empty, "--run", empty]).contains("two systems have the name"));
 }

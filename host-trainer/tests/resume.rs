@@ -1,12 +1,15 @@
-//! A killed run goes on exactly where its last checkpoint was.
+//! A killed run continues from its last checkpoint, bit by bit.
 
 use clap::Parser;
-use gleaner_host_trainer::learn::learner::{DdqnCgl, Gleaner, Learner, MosacAtt, MosacCgl, MosacFtv};
-use gleaner_host_trainer::learn::learning::Learning;
-use gleaner_host_trainer::learn::run::{CHECKPOINT, Run, TrainError};
-use gleaner_host_trainer::learn::settings::Settings;
-use gleaner_host_trainer::systems::System;
+use gleaner_host_trainer::env::site::Site;
+use gleaner_host_trainer::keep::snapshot::{LAST, Snapshot};
+use gleaner_host_trainer::learn::algorithm::Algorithm;
+use gleaner_host_trainer::learn::run::{CHECKPOINT, OffPolicyRun};
+use gleaner_host_trainer::learn::trainer::{TrainError, Trainer};
+use gleaner_host_trainer::settings::Settings;
+use gleaner_host_trainer::systems::{DdqnCgl, Gleaner, MosacAtt, MosacAttLayers, MosacCgl, MosacFtv};
 use std::fs;
+use std::path::Path;
 
 #[derive(Parser)]
 struct Command {
@@ -20,15 +23,19 @@ fn settings(more: &[&str]) -> Settings {
     Command::parse_from(usual.iter().chain(&shares).chain(more)).settings
 }
 
-fn resumes<L: Learner>() {
+fn open<A: Algorithm>(settings: Settings, folder: &Path) -> Result<OffPolicyRun<A>, TrainError> {
+    OffPolicyRun::open(settings, Site::default_site(), folder)
+}
+
+fn check_resume<A: Algorithm>(settings: &Settings) {
     let (through, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let mut run = Run::<L>::open(settings(&[]), through.path()).unwrap();
+    let mut run = open::<A>(settings.clone(), through.path()).unwrap();
     while !run.is_done() {
         run.advance().unwrap();
     }
     run.save(through.path()).unwrap();
 
-    let mut run = Run::<L>::open(settings(&[]), stopped.path()).unwrap();
+    let mut run = open::<A>(settings.clone(), stopped.path()).unwrap();
     for _ in 0..23 {
         run.advance().unwrap();
     }
@@ -37,7 +44,7 @@ fn resumes<L: Learner>() {
         run.advance().unwrap(); // lost in the kill
     }
     drop(run);
-    let mut run = Run::<L>::open(settings(&[]), stopped.path()).unwrap();
+    let mut run = open::<A>(settings.clone(), stopped.path()).unwrap();
     assert_eq!(run.update(), 23);
     while !run.is_done() {
         run.advance().unwrap();
@@ -45,81 +52,89 @@ fn resumes<L: Learner>() {
     run.save(stopped.path()).unwrap();
 
     let read = |folder: &tempfile::TempDir| fs::read(folder.path().join(CHECKPOINT)).unwrap();
-    assert!(read(&through) == read(&stopped), "{}: the two runs differ", L::SYSTEM);
+    assert!(read(&through) == read(&stopped), "{}: the two runs differ", A::NAME);
 }
 
 #[test]
-fn resuming_gives_the_same_bits_as_never_having_stopped() {
-    resumes::<Gleaner>();
-    resumes::<MosacAtt>();
-    resumes::<MosacCgl>();
-    resumes::<DdqnCgl>();
-    resumes::<MosacFtv>();
+fn resumed_run_equals_an_uninterrupted_one() {
+    check_resume::<Gleaner>(&settings(&[]));
+    check_resume::<MosacAtt>(&settings(&[]));
+    check_resume::<MosacAttLayers>(&settings(&[]));
+    check_resume::<MosacCgl>(&settings(&[]));
+    check_resume::<DdqnCgl>(&settings(&[]));
+    check_resume::<MosacFtv>(&settings(&[]));
 }
 
 #[test]
-fn a_folder_with_a_run_of_another_system_is_refused() {
+fn resume_keeps_unfinished_n_step_returns() {
+    let options =
+        ["--n-step", "5", "--twin-minimum", "scalarised", "--heat-in-policy", "--pure-preferences", "0"];
+    check_resume::<MosacFtv>(&settings(&options));
+}
+
+#[test]
+fn folder_of_another_system_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    Run::<DdqnCgl>::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
-    let error = Run::<MosacCgl>::open(settings(&[]), folder.path()).err().unwrap();
-    assert!(matches!(error, TrainError::OtherSystem { found: System::DdqnCgl, .. }), "{error}");
+    open::<DdqnCgl>(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
+    let error = open::<MosacCgl>(settings(&[]), folder.path()).err().unwrap();
+    assert!(matches!(&error, TrainError::OtherSystem { found, .. } if found == "ddqn-cgl"), "{error}");
     assert!(error.to_string().contains("--system ddqn-cgl"), "{error}");
 }
 
 #[test]
-fn a_folder_with_another_run_is_refused_and_a_longer_run_is_not() {
+fn other_settings_are_refused_but_more_updates_are_not() {
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Run::<Gleaner>::open(settings(&[]), folder.path()).unwrap();
-    run.save(folder.path()).unwrap();
-    let error = Run::<Gleaner>::open(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
+    open::<Gleaner>(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
+    let error = open::<Gleaner>(settings(&["--discount", "0.9"]), folder.path()).err().unwrap();
     assert!(matches!(error, TrainError::OtherSettings { .. }), "{error}");
     let mut longer = settings(&[]);
     longer.updates = 90;
-    assert!(Run::<Gleaner>::open(longer, folder.path()).is_ok());
-}
-
-fn notices_damage<L: Learner>() {
-    let folder = tempfile::tempdir().unwrap();
-    Run::<L>::open(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
-    let path = folder.path().join(CHECKPOINT);
-    let whole = fs::read(&path).unwrap();
-    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
-    let error = Run::<L>::open(settings(&[]), folder.path()).err().unwrap().to_string();
-    assert!(error.contains("damaged"), "{error}");
-    assert_eq!(fs::read(&path).unwrap().len(), whole.len() / 2, "the evidence is untouched");
+    assert!(open::<Gleaner>(longer, folder.path()).is_ok());
 }
 
 #[test]
-fn a_damaged_checkpoint_is_refused_and_kept() {
-    notices_damage::<Gleaner>();
-    notices_damage::<MosacCgl>();
-    notices_damage::<DdqnCgl>();
-    notices_damage::<MosacFtv>();
+fn checkpoint_leaves_the_last_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = open::<MosacFtv>(settings(&[]), folder.path()).unwrap();
+    run.advance().unwrap();
+    run.save(folder.path()).unwrap();
+    let last = Snapshot::load(&folder.path().join(LAST)).unwrap().unwrap();
+    assert_eq!((last.update, last.steps, last.system.as_str()), (1, run.steps(), "mosac-ftv"));
 }
 
-#[cfg(target_os = "linux")]
-fn survives_a_full_disk<L: Learner>() {
+fn check_damage<A: Algorithm>() {
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Run::<L>::open(settings(&[]), folder.path()).unwrap();
+    open::<A>(settings(&[]), folder.path()).unwrap().save(folder.path()).unwrap();
+    let path = folder.path().join(CHECKPOINT);
+    let whole = fs::read(&path).unwrap();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    let error = open::<A>(settings(&[]), folder.path()).err().unwrap().to_string();
+    assert!(error.contains("damaged"), "{error}");
+    assert_eq!(fs::read(&path).unwrap().len(), whole.len() / 2, "the damaged file is kept");
+}
+
+#[test]
+fn damaged_checkpoint_is_refused_and_kept() {
+    check_damage::<Gleaner>();
+    check_damage::<MosacCgl>();
+    check_damage::<DdqnCgl>();
+    check_damage::<MosacFtv>();
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn full_disk_keeps_the_last_good_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut run = open::<MosacFtv>(settings(&[]), folder.path()).unwrap();
     run.save(folder.path()).unwrap();
     let path = folder.path().join(CHECKPOINT);
     let good = fs::read(&path).unwrap();
     run.advance().unwrap();
-    // What cannot be written through stands for a full disk: every byte sent there is refused for want of space.
+    // /dev/full refuses every byte, as a full disk does.
     std::os::unix::fs::symlink("/dev/full", path.with_extension("writing")).unwrap();
     let error = run.save(folder.path()).err().unwrap().to_string();
     assert!(error.contains("No space left on device"), "{error}");
-    assert!(fs::read(&path).unwrap() == good, "the last good checkpoint is untouched");
-    // With room again, the run goes on as if nothing had happened.
+    assert!(fs::read(&path).unwrap() == good, "the last good checkpoint is unchanged");
     run.save(folder.path()).unwrap();
     assert!(fs::read(&path).unwrap() != good);
-}
-
-#[test]
-#[cfg(target_os = "linux")]
-fn a_full_disk_is_said_and_never_destroys_the_last_good_checkpoint() {
-    survives_a_full_disk::<Gleaner>();
-    survives_a_full_disk::<MosacCgl>();
-    survives_a_full_disk::<DdqnCgl>();
-    survives_a_full_disk::<MosacFtv>();
 }

@@ -1,19 +1,21 @@
-//! The teacher is a teacher worth having, and a pupil of it survives a kill.
+//! The teacher collects more than GREEDY, and distillation learns from it and resumes.
 
 use clap::Parser;
 use gleaner_host_trainer::env::flight::Flight;
+use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::judge::evaluation::{Network, evaluate_greedy, realizations};
-use gleaner_host_trainer::keep::snapshot::Learned;
+use gleaner_host_trainer::keep::snapshot::Snapshot;
 use gleaner_host_trainer::learn::distil::Distillation;
-use gleaner_host_trainer::learn::learning::Learning;
-use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::learn::trainer::{TrainError, Trainer};
 use gleaner_host_trainer::net::Shape;
+use gleaner_host_trainer::observe::tokens;
 use gleaner_host_trainer::planner::teacher::Teacher;
-use gleaner_host_trainer::systems::System;
+use gleaner_host_trainer::settings::Settings;
 use gleaner_policy::Preference;
 use gleaner_units::Action;
 use gleaner_world::{ScenarioKind, World};
 use rand::SeedableRng;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Mean percent of the data and mean energy over realizations.
@@ -33,12 +35,11 @@ fn fly(world: &Arc<World>, kind: ScenarioKind, preference: Preference, count: u6
 }
 
 #[test]
-fn the_teacher_collects_more_than_greedy_and_wastes_nothing_for_energy() {
+fn teacher_beats_greedy_and_wastes_no_energy() {
     let world = Arc::new(World::default_world());
     for (kind, least) in [(ScenarioKind::ReachDestination, 32.0), (ScenarioKind::ReturnBase, 2.0)] {
         let greedy = evaluate_greedy(&world, &realizations(&world, &kind.scenario(), 20).unwrap());
         let (percent, energy) = fly(&world, kind, Preference::DATA, 20);
-        println!("{kind}: teacher {percent:.1} % for {energy:.1} units, GREEDY {:.1} %", greedy.coverage());
         assert!(percent > greedy.coverage() + 5.0, "{kind}: {percent} against {}", greedy.coverage());
         assert!(energy <= 80.0);
         assert_eq!(fly(&world, kind, Preference::ENERGY, 5).1, least, "{kind}");
@@ -51,13 +52,22 @@ struct Command {
     settings: Settings,
 }
 
+fn open(
+    settings: &Settings,
+    folder: &Path,
+    from: Option<&Snapshot>,
+    mentors: Vec<Snapshot>,
+) -> Result<Distillation, TrainError> {
+    Distillation::open(settings.clone(), Site::default_site(), folder, from, mentors)
+}
+
 #[test]
-fn a_distillation_learns_and_goes_on_after_a_kill() {
+fn distillation_learns_and_resumes() {
     let words =
         ["distil", "--updates", "300", "--batch", "8", "--replay", "3000", "--learning-rate", "0.001"];
     let settings = Command::parse_from(words).settings;
     let folder = tempfile::tempdir().unwrap();
-    let mut run = Distillation::open(settings.clone(), folder.path(), None, Vec::new()).unwrap();
+    let mut run = open(&settings, folder.path(), None, Vec::new()).unwrap();
     let first = run.advance().unwrap().cross_entropy;
     assert!(first < (Action::COUNT as f32).ln() * 1.2, "an untrained policy is near uniform: {first}");
     while run.update() < 200 {
@@ -65,7 +75,7 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
     }
     run.save(folder.path()).unwrap();
     drop(run);
-    let mut run = Distillation::open(settings, folder.path(), None, Vec::new()).unwrap();
+    let mut run = open(&settings, folder.path(), None, Vec::new()).unwrap();
     assert_eq!(run.update(), 200);
     let mut last = 0.0;
     while !run.is_done() {
@@ -74,14 +84,14 @@ fn a_distillation_learns_and_goes_on_after_a_kill() {
     assert!(last < 0.75 * first, "cross entropy {first} before, {last} after 300 updates");
 }
 
-/// A pupil that begins as its own mentor: the views of an untrained network disagree, those of the pupil less.
+/// The student starts as its own mentor. The views of an untrained network disagree, those of the student less.
 #[test]
-fn a_pupil_of_its_own_views_is_of_one_mind() {
+fn views_of_a_self_distilled_policy_agree() {
     let words =
         ["distil", "--updates", "300", "--batch", "8", "--replay", "3000", "--learning-rate", "0.001"];
     let settings = Command::parse_from(words).settings;
-    let mentor = Learned {
-        system: System::Gleaner,
+    let mentor = Snapshot {
+        system: "gleaner".into(),
         method: "train".into(),
         settings: settings.clone(),
         actor: Shape::actor().initialise(&mut rand_chacha::ChaCha8Rng::seed_from_u64(3)),
@@ -94,8 +104,8 @@ fn a_pupil_of_its_own_views_is_of_one_mind() {
     let flights = flights
         .iter()
         .map(|(seed, realization)| Flight::new(&world, realization, *seed, Preference::DATA).unwrap());
-    let samples: Vec<_> = flights.map(|flight| flight.sample()).collect();
-    let discord = |actor: &[f32]| {
+    let samples: Vec<_> = flights.map(|flight| tokens::sample(&flight)).collect();
+    let disagreement = |actor: &[f32]| {
         let mut network = Network::new(Shape::actor(), actor);
         let means = network.averaged_logits(&samples);
         let plain = network.logits(samples.iter().copied());
@@ -105,13 +115,13 @@ fn a_pupil_of_its_own_views_is_of_one_mind() {
     let folder = tempfile::tempdir().unwrap();
     let mut best = None;
     let mentors = vec![mentor.clone()];
-    let mut run = Distillation::open(settings, folder.path(), Some(&mentor), mentors).unwrap();
+    let mut run = open(&settings, folder.path(), Some(&mentor), mentors).unwrap();
     while !run.is_done() {
         assert!(run.advance().unwrap().cross_entropy.is_finite());
     }
     run.validate(&mut best).unwrap();
-    let pupil = best.unwrap();
-    assert!(pupil.method.ends_with("distil --from FIRST --mentor FIRST"), "{}", pupil.method);
-    let (before, after) = (discord(&mentor.actor), discord(&pupil.actor));
+    let student = best.unwrap();
+    assert!(student.method.ends_with("distil --from FIRST --mentor FIRST"), "{}", student.method);
+    let (before, after) = (disagreement(&mentor.actor), disagreement(&student.actor));
     assert!(after < 0.5 * before, "{before} before, {after} after");
 }

@@ -15,17 +15,16 @@ const CIRCLES_LEFT: [(&str, usize); 5] = [
     ("firmware/link", 1),
     ("firmware/pilot", 1),
     ("sitl/world", 1),
-    ("host-trainer", 4),
+    ("host-trainer", 1),
 ];
 
 /// Files that are still too long. Remove lines, never add any.
-const LONG_FILES_LEFT: [&str; 8] = [
+const LONG_FILES_LEFT: [&str; 7] = [
     "firmware/pilot/src/onboard/mod.rs",
     "firmware/pilot/src/states/flying.rs",
     "firmware/pilot/tests/pilot/onboard.rs",
     "firmware/policy/src/native/blob.rs",
-    "host-trainer/src/planner/bound.rs",
-    "host-trainer/src/refine.rs",
+    "host-trainer/src/planner/bound/mod.rs",
     "host-trainer/src/report/page.rs",
     "sitl/harness/src/program/arguments.rs",
 ];

@@ -1,7 +1,7 @@
-//! The processor's clock.
+//! CPU time.
 
-/// Milliseconds that this thread has been running, by the kernel's count; it moves on at each
-/// scheduler tick, so rounds must be long. Only Linux tells.
+/// CPU time of this thread, milliseconds. It advances with the scheduler ticks, so measured rounds must be long. Linux
+/// only.
 pub fn cpu_ms() -> Option<f64> {
     let line = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     let nanoseconds: f64 = line.split_whitespace().next()?.parse().ok()?;

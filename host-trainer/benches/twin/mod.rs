@@ -1,4 +1,4 @@
-//! The work of one update on made-up data: the twin of `scripts/pytorch_update_bench.py`, step for step.
+//! One update on random data: the counterpart of `scripts/pytorch_update_bench.py`, step by step.
 
 use gleaner_host_trainer::net::{Adam, Batch, Sample, Shape, Workspace, forward, forward_backward, polyak};
 use rand::{RngExt, SeedableRng};
@@ -19,7 +19,7 @@ pub struct Trained {
     adam: Adam,
 }
 
-/// A learner with everything that an update touches.
+/// All networks and buffers of an update.
 pub struct Learner {
     pub actor: Trained,
     pub critics: [Trained; 2],
@@ -84,10 +84,10 @@ impl Learner {
         }
     }
 
-    /// One update: three target forwards, two critics and the actor forward and backward, three
-    /// Adams, two Polyak steps.
+    /// One update: three forward passes for the targets; forward and backward passes of two critics and the actor; three
+    /// Adam steps; two Polyak steps.
     pub fn update(&mut self) {
-        let goals = self.goals();
+        let goals = self.targets();
         let mut lower = vec![[f32::INFINITY; VALUES]; SAMPLES];
         for critic in &mut self.critics {
             critic.gradients.fill(0.0);
@@ -116,13 +116,13 @@ impl Learner {
             }
             critic.descend();
         }
-        self.improve_actor(&lower);
+        self.step_actor(&lower);
         for (target, critic) in self.targets.iter_mut().zip(&self.critics) {
             polyak(target, &critic.parameters, 0.005);
         }
     }
 
-    fn goals(&mut self) -> Vec<[f32; OBJECTIVES]> {
+    fn targets(&mut self) -> Vec<[f32; OBJECTIVES]> {
         let workspace = &mut self.workspace;
         let logits = forward(&Shape::actor(), &self.actor.parameters, &self.after, workspace).to_vec();
         let first = forward(&Shape::critic(), &self.targets[0], &self.after, workspace).to_vec();
@@ -140,7 +140,7 @@ impl Learner {
         goals
     }
 
-    fn improve_actor(&mut self, lower: &[[f32; VALUES]]) {
+    fn step_actor(&mut self, lower: &[[f32; VALUES]]) {
         self.actor.gradients.fill(0.0);
         let preferences = &self.preferences;
         let soft_value = |range: std::ops::Range<usize>, outputs: &[f32], d: &mut [f32]| {

@@ -1,139 +1,174 @@
 //! `gleaner-train evaluate`.
 
+use super::mismatch::MismatchArguments;
 use super::oracle::{bar, known, plan, prove, read_or_shipped};
-use anyhow::{Context, Result, bail};
+use super::site::SiteArguments;
+use super::{model, snapshot_in};
+use anyhow::{Result, bail};
+use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::judge::evaluation::{
-    Engine, Missions, Table, fly_all, fly_greedy, realizations, test_preferences,
+    Decider, Engine, Missions, Table, fly_all_as, fly_greedy, test_preferences,
 };
+use gleaner_host_trainer::judge::mismatch::Mismatch;
 use gleaner_host_trainer::judge::paper::Setting;
-use gleaner_host_trainer::learn::run::Learned;
 use gleaner_host_trainer::planner::oracle::Thoroughness;
 use gleaner_host_trainer::planner::{DEVICES_MAX, Rates};
 use gleaner_units::BatteryUnits;
-use gleaner_world::{Channel, City, Realization, ScenarioKind, Seed, World};
-use std::path::{Path, PathBuf};
+use gleaner_world::{City, Realization, ScenarioKind, Seed, World};
+use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// An ONNX model, flown by the engine that flies it on board.
-    #[arg(long)]
+    /// An ONNX model, in the engine that flies it on board.
+    #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// The folder of a run: its best parameters, flown by the learner's network.
-    #[arg(long)]
+    /// The folder of a run: its best parameters; FOLDER/last has the last ones.
+    #[arg(long, value_name = "FOLDER")]
     run: Option<PathBuf>,
     /// `rd` reaches a destination, `rb` returns to base.
-    #[arg(long, default_value = "rd")]
+    #[arg(long, value_parser = super::scenario::parse, default_value = "rd")]
     scenario: ScenarioKind,
-    /// Number of devices, K.
-    #[arg(long, default_value_t = 6)]
-    devices: usize,
-    /// Battery units at the start, B.
-    #[arg(long, default_value_t = 80)]
-    battery: u16,
+    /// Number of devices, K [default: 6, or those of --mission].
+    #[arg(long, conflicts_with = "mission")]
+    devices: Option<usize>,
+    /// Battery units at the start, B [default: 80, or that of --mission].
+    #[arg(long)]
+    battery: Option<u16>,
     /// Evaluation realizations, numbers 0 to N - 1, in each city.
     #[arg(long, default_value_t = 100)]
     realizations: u64,
-    /// Fly over so many generated cities, numbers 0 to N - 1, in which nothing was ever trained, instead of the default
-    /// one.
-    #[arg(long)]
+    /// Fly over this many generated cities, numbers 0 to N - 1, which no policy was trained in, instead of the default
+    /// city.
+    #[arg(long, conflicts_with_all = ["city", "mission"])]
     cities: Option<u64>,
-    /// Ask the oracle, with so many tours for each search; 20,000 take less than a second per mission. Left out, it and
-    /// the proven bound are those of `models/oracle.jsonl` where that has these missions.
+    /// Run the oracle, with this many tours per search; 20,000 take less than a second per mission. Without it, oracle
+    /// and proven bound come from `models/oracle.jsonl` where that file has these missions.
     #[arg(long, value_name = "TOURS")]
     oracle: Option<u32>,
-    /// Prove how much of the data can be had at most, looking at so many parts of each mission's possibilities; 2000 take
-    /// some seconds per mission.
+    /// Prove an upper bound of the collected data, with this many nodes of the search tree; 2000 take some seconds per
+    /// mission.
     #[arg(long, value_name = "PARTS", requires = "oracle")]
     bound: Option<u32>,
-    /// One JSON object instead of tables.
+    /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    site: SiteArguments,
+    #[command(flatten)]
+    mismatch: MismatchArguments,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.realizations == 0 {
-        bail!("--realizations 0: nothing to fly; give at least 1");
-    }
-    if arguments.cities == Some(0) {
-        bail!("--cities 0: nowhere to fly; give at least 1, or leave it out for the default city");
-    }
-    if arguments.oracle.is_some() && arguments.devices > DEVICES_MAX {
-        bail!(
-            "--devices {}: the oracle plans for at most {DEVICES_MAX}; leave out --oracle",
-            arguments.devices
-        );
-    }
+    check(arguments)?;
     let places = places(arguments)?;
-    let mut systems =
-        vec![("GREEDY".to_owned(), over(&places, |world, drawn| Ok(fly_greedy(world, drawn)))?)];
+    let mut systems = vec![("GREEDY".to_owned(), over(&places, Place::fly_greedy)?)];
     if let Some(folder) = &arguments.run {
-        let learned = learned(folder)?;
-        let mut decider = learned.decider();
-        let table =
-            over(&places, |world, drawn| Ok(fly_all(world, drawn, &test_preferences(), &mut *decider)?))?;
+        let (system, snapshot) = snapshot_in(folder)?;
+        let mut policy = system.policy(&snapshot);
+        let table = over(&places, |place| place.fly(&mut *policy))?;
         systems.push((format!("{}", folder.display()), table));
     }
     if let Some(path) = &arguments.model {
-        let mut policy = super::export::load_model(path)?;
-        let table = over(&places, |world, drawn| {
-            Ok(fly_all(world, drawn, &test_preferences(), &mut Engine(&mut policy))?)
-        })?;
+        let mut policy = model::load(path)?;
+        let table = over(&places, |place| place.fly(&mut Engine(&mut policy)))?;
         systems.push((format!("{}", path.display()), table));
     }
-    let Limits { oracle, data_percent } = limits(arguments, &places)?;
-    let summary = summary(&systems, oracle.as_ref(), data_percent);
+    let References { oracle, bound_percent } = references(arguments, &places)?;
+    let summary = summary(&systems, oracle.as_ref(), bound_percent);
     systems.extend(oracle.map(|oracle| (ORACLE.to_owned(), oracle)));
     if arguments.json {
-        let mut object: serde_json::Map<_, _> = systems
-            .into_iter()
-            .map(|(name, table)| Ok((name, serde_json::to_value(table)?)))
-            .collect::<Result<_>>()?;
-        if let Some(percent) = data_percent {
-            object.insert(BOUND.to_owned(), serde_json::json!({ "data_percent": percent }));
-        }
-        println!("{}", serde_json::Value::Object(object));
-    } else {
-        let cities =
-            arguments.cities.map_or(String::new(), |count| format!(" in each of {count} generated cities"));
-        println!(
-            "{}, K = {}, B = {}, {} realizations{cities}\n\n{summary}",
-            arguments.scenario, arguments.devices, arguments.battery, arguments.realizations
-        );
-        for (name, table) in &systems {
-            println!("\n## {name}\n\n{}", render(table));
-        }
+        return print_json(systems, bound_percent);
+    }
+    println!("{}\n\n{summary}", heading(arguments, &places));
+    for (name, table) in &systems {
+        println!("\n## {name}\n\n{}", render(table));
     }
     Ok(())
+}
+
+fn check(arguments: &Arguments) -> Result<()> {
+    if arguments.realizations == 0 {
+        bail!("--realizations 0: no mission to fly; give at least 1");
+    }
+    if arguments.devices == Some(0) {
+        bail!("--devices 0: a mission without devices has no data to measure; give at least 1");
+    }
+    if arguments.cities == Some(0) {
+        bail!("--cities 0: no city to fly over; give at least 1, or leave it out for the default city");
+    }
+    if let Some(devices) = arguments.devices.filter(|&devices| devices > DEVICES_MAX)
+        && arguments.oracle.is_some()
+    {
+        bail!("--devices {devices}: the oracle plans for at most {DEVICES_MAX}; leave out --oracle");
+    }
+    Ok(())
+}
+
+fn print_json(systems: Vec<(String, Table)>, bound_percent: Option<f32>) -> Result<()> {
+    let mut object: serde_json::Map<_, _> = systems
+        .into_iter()
+        .map(|(name, table)| Ok((name, serde_json::to_value(table)?)))
+        .collect::<Result<_>>()?;
+    if let Some(percent) = bound_percent {
+        object.insert(BOUND.to_owned(), serde_json::json!({ "data_percent": percent }));
+    }
+    println!("{}", serde_json::Value::Object(object));
+    Ok(())
+}
+
+/// Scenario, numbers, place and mismatch in one line.
+fn heading(arguments: &Arguments, places: &[Place]) -> String {
+    let first = places.first().and_then(|place| place.drawn.first());
+    let (devices, battery) =
+        first.map_or((0, 0.0), |(_, realization)| (realization.devices().len(), realization.battery().0));
+    let mut text = format!(
+        "{}, K = {devices}, B = {battery}, {} realizations",
+        arguments.scenario, arguments.realizations
+    );
+    if let Some(count) = arguments.cities {
+        let _ = write!(text, " in each of {count} generated cities");
+    }
+    for path in [&arguments.site.city, &arguments.site.mission].into_iter().flatten() {
+        let _ = write!(text, ", {}", path.display());
+    }
+    text + &arguments.mismatch.to_string()
 }
 
 const ORACLE: &str = "oracle";
 const BOUND: &str = "proven bound";
 
-/// What systems are measured against, as far as it is known.
+/// What the systems are measured against, as far as it is known.
 #[derive(Default)]
-struct Limits {
+struct References {
     oracle: Option<Table>,
-    /// Percent of the data at w = (1, 0) that nobody can exceed in the mean.
-    data_percent: Option<f32>,
+    /// Upper bound of the data at w = (1, 0), percent, mean over the missions.
+    bound_percent: Option<f32>,
 }
 
-/// Plans and proves what is asked for; else what is shipped has it, if it has these missions.
-fn limits(arguments: &Arguments, places: &[Place]) -> Result<Limits> {
+/// Runs oracle and bound if asked, else takes them from the shipped file if it has these missions.
+fn references(arguments: &Arguments, places: &[Place]) -> Result<References> {
     let Some(tours) = arguments.oracle else {
-        if arguments.cities.is_some() {
-            return Ok(Limits::default());
+        let is_nominal = arguments.cities.is_none()
+            && arguments.site.is_default()
+            && arguments.mismatch.channel_is_nominal();
+        if !is_nominal {
+            return Ok(References::default());
         }
-        let setting =
-            Setting { kind: arguments.scenario, devices: arguments.devices, battery: arguments.battery };
+        let setting = Setting {
+            kind: arguments.scenario,
+            devices: arguments.devices.unwrap_or(6),
+            battery: arguments.battery.unwrap_or(80),
+        };
         let known = known(&read_or_shipped(None)?, setting, arguments.realizations);
-        return Ok(known.map_or_else(Limits::default, |known| Limits {
-            data_percent: known.limits(setting).map(|limits| limits.data_percent),
+        return Ok(known.map_or_else(References::default, |known| References {
+            bound_percent: known.limits(setting).map(|limits| limits.data_percent),
             oracle: Some(known.missions.table()),
         }));
     };
     let mut bounds = Vec::new();
-    let oracle = over(places, |world, drawn| {
+    let oracle = over(places, |Place { world, drawn, .. }| {
         let rates = Rates::new(Arc::clone(world));
         let planned = plan(&rates, drawn, Thoroughness { tours }, &bar(drawn, ORACLE.into()));
         if let Some(parts) = arguments.bound {
@@ -141,8 +176,8 @@ fn limits(arguments: &Arguments, places: &[Place]) -> Result<Limits> {
         }
         Ok(planned)
     })?;
-    let data_percent = (!bounds.is_empty()).then(|| bounds.iter().sum::<f32>() / bounds.len() as f32);
-    Ok(Limits { oracle: Some(oracle), data_percent })
+    let bound_percent = (!bounds.is_empty()).then(|| bounds.iter().sum::<f32>() / bounds.len() as f32);
+    Ok(References { oracle: Some(oracle), bound_percent })
 }
 
 /// All systems in one Markdown table, with their share of what the oracle reaches.
@@ -176,55 +211,75 @@ fn summary(systems: &[(String, Table)], oracle: Option<&Table>, bound: Option<f3
     text
 }
 
-/// A city, and the missions to fly over it.
-type Place = (Arc<World>, Vec<(Seed, Realization)>);
-
-fn places(arguments: &Arguments) -> Result<Vec<Place>> {
-    let scenario = arguments
-        .scenario
-        .scenario()
-        .with_devices(arguments.devices)
-        .with_battery(BatteryUnits(f32::from(arguments.battery)));
-    let worlds = match arguments.cities {
-        None => vec![World::default_world()],
-        Some(count) => {
-            (0..count).map(|number| World::new(City::generate(number), Channel::default())).collect()
-        }
-    };
-    worlds
-        .into_iter()
-        .map(|world| {
-            let drawn = realizations(&world, &scenario.in_city(world.city()), arguments.realizations)?;
-            Ok((Arc::new(world), drawn))
-        })
-        .collect()
+/// A world, the missions to fly in it, and what the policy knows of it.
+struct Place {
+    world: Arc<World>,
+    drawn: Vec<(Seed, Realization)>,
+    mismatch: Mismatch,
+    /// The map on board, if it is not the true one.
+    map: Option<Arc<City>>,
 }
 
-/// One table over all places. GREEDY may choose its parameterisation anew in each.
-fn over(
-    places: &[Place],
-    mut fly: impl FnMut(&Arc<World>, &[(Seed, Realization)]) -> Result<Missions>,
-) -> Result<Table> {
+impl Place {
+    fn fly(&self, policy: &mut dyn Decider) -> Result<Missions> {
+        let prepare = |flight, seed| self.mismatch.prepare(flight, self.map.as_ref(), seed);
+        Ok(fly_all_as(&self.world, &self.drawn, &test_preferences(), policy, prepare)?)
+    }
+
+    fn fly_greedy(&self) -> Result<Missions> {
+        Ok(fly_greedy(&self.world, &self.drawn))
+    }
+}
+
+fn places(arguments: &Arguments) -> Result<Vec<Place>> {
+    let sites = match arguments.cities {
+        None => vec![arguments.site.site()?],
+        Some(count) => {
+            let channel = gleaner_world::Channel::default();
+            (0..count)
+                .map(|number| Site::new(Arc::new(World::new(City::generate(number), channel))))
+                .collect()
+        }
+    };
+    sites.iter().map(|site| place(arguments, site)).collect()
+}
+
+fn place(arguments: &Arguments, site: &Site) -> Result<Place> {
+    let mismatch = arguments.mismatch.mismatch();
+    let city = site.world().city();
+    let site = site.in_world(Arc::new(mismatch.world(city.clone())));
+    let mut scenario = site.scenario(arguments.scenario);
+    if let Some(devices) = arguments.devices {
+        scenario = scenario.with_devices(devices);
+    }
+    if let Some(battery) = arguments.battery {
+        scenario = scenario.with_battery(BatteryUnits(f32::from(battery)));
+    }
+    let drawn = (0..arguments.realizations).map(|number| {
+        let seed = Seed::evaluation(number);
+        Ok((seed, site.realization(&scenario, seed)?))
+    });
+    Ok(Place {
+        drawn: drawn.collect::<Result<_>>()?,
+        // One seed: every system gets the same wrong map.
+        map: mismatch.map(city, Seed::evaluation(0)),
+        mismatch,
+        world: Arc::clone(site.world()),
+    })
+}
+
+/// One table over all places. GREEDY chooses its parameter in each place.
+fn over(places: &[Place], mut fly: impl FnMut(&Place) -> Result<Missions>) -> Result<Table> {
     let mut all = Missions(vec![Vec::new(); test_preferences().len()]);
-    for (world, drawn) in places {
-        for (all, missions) in all.0.iter_mut().zip(fly(world, drawn)?.0) {
+    for place in places {
+        for (all, missions) in all.0.iter_mut().zip(fly(place)?.0) {
             all.extend(missions);
         }
     }
     Ok(all.table())
 }
 
-/// The best parameters of the run in `folder`.
-pub fn learned(folder: &Path) -> Result<Learned> {
-    Learned::load(folder)?.with_context(|| {
-        format!(
-            "{}: no run has been validated here yet; wait for its first line or check --run",
-            folder.display()
-        )
-    })
-}
-
-/// The table as Markdown, for people and for model cards.
+/// The table as Markdown, for the console and for model cards.
 pub fn render(table: &Table) -> String {
     let mut text = String::from("| w_data | data % | energy | energy std |\n|---|---|---|---|\n");
     for row in &table.rows {

@@ -1,7 +1,7 @@
 //! `gleaner-train export`.
 
 use super::evaluate::render;
-use super::{learned_of, oracle, write_whole};
+use super::{oracle, snapshot_of, write_whole};
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::env::flight::Flight;
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs};
@@ -9,16 +9,15 @@ use gleaner_host_trainer::judge::evaluation::{
     Engine, Network, Table, evaluate, evaluate_greedy, realizations,
 };
 use gleaner_host_trainer::judge::paper::Setting;
-use gleaner_host_trainer::learn::run::Learned;
-use gleaner_host_trainer::learn::settings::Settings;
+use gleaner_host_trainer::keep::snapshot::{LAST, Snapshot};
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::planner::oracle::OracleSetting;
+use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::systems::System;
 use gleaner_policy::Tokens;
 use gleaner_policy::onnx::TractPolicy;
 use gleaner_world::{ScenarioKind, World};
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Arc;
@@ -28,49 +27,47 @@ pub struct Arguments {
     /// The folder of the run.
     #[arg(long)]
     run: PathBuf,
-    /// The model to write; its card is written beside it with the extension `md`.
+    /// The model to write. Its card is written beside it with the extension `md`; the folder is made if needed.
     #[arg(long)]
     model: PathBuf,
-    /// What people call it.
-    #[arg(long, default_value = "gleaner")]
-    name: String,
-    /// The commit that trained it; asked of git when not given.
+    /// Name of the model in its card [default: the name of the run's folder].
+    #[arg(long)]
+    name: Option<String>,
+    /// The commit that trained it [default: that of the git repository here, else "unknown"].
     #[arg(long)]
     commit: Option<String>,
     /// Evaluation realizations per setting in the card.
     #[arg(long, default_value_t = 100)]
     realizations: u64,
-    /// What `gleaner-train oracle` wrote, for the card. The default is the shipped one.
+    /// A file of `gleaner-train oracle`, for the card [default: the shipped one].
     #[arg(long, value_name = "FILE")]
     oracle: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
-        bail!("--realizations 0: a card without measurements is no card; give at least 1");
+        bail!("--realizations 0: the card needs measurements; give at least 1");
     }
-    let learned = learned_of(System::Gleaner, &arguments.run)?;
+    let snapshot = snapshot_of(System::Gleaner, &arguments.run)?;
     let world = Arc::new(World::default_world());
-    let commit = match &arguments.commit {
-        Some(commit) => commit.clone(),
-        None => head_commit().context("no git here to name the commit; give --commit")?,
-    };
+    let commit = arguments.commit.clone().or_else(head_commit).unwrap_or_else(|| "unknown".to_owned());
     let card = ModelCard {
-        name: arguments.name.clone(),
+        name: arguments.name.clone().unwrap_or_else(|| run_name(&arguments.run)),
         version: env!("CARGO_PKG_VERSION").into(),
         commit,
-        command: learned.settings.command_line(&learned.method, "RUN"),
-        seed: learned.settings.seed,
-        steps: learned.steps,
-        scenario: scenario_name(&learned.settings),
+        command: snapshot.command_line("RUN"),
+        seed: snapshot.settings.seed,
+        steps: snapshot.steps,
+        scenario: scenario_name(&snapshot.settings),
         city_hash: world.city().fingerprint(),
     };
-    let (shape, actor) = (Shape::actor(), &learned.actor);
+    let (shape, actor) = (Shape::actor(), &snapshot.actor);
     let goldens = golden_pairs(actor, shape, &golden_observations(&world)?);
     let bytes = export(actor, shape, &card, &goldens)?;
-    // What is shipped is what is measured: the written bytes, in the engine that flies them.
-    let mut policy = TractPolicy::load_checked(&bytes).context("the exported model fails its own test")?;
-    let text = card_text(&card, &learned, &mut policy, &world, arguments)?;
+    // The card measures the written bytes in the engine that flies them.
+    let mut policy =
+        TractPolicy::load_checked(&bytes).context("the exported model fails its golden pairs")?;
+    let text = card_text(&card, &snapshot, &mut policy, &world, arguments)?;
     write_whole(&arguments.model, &bytes)?;
     let card_path = arguments.model.with_extension("md");
     write_whole(&card_path, text.as_bytes())?;
@@ -78,13 +75,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Loads a model and tests it with its golden pairs.
-pub fn load_model(path: &Path) -> Result<TractPolicy> {
-    let bytes = fs::read(path).with_context(|| format!("{}", path.display()))?;
-    TractPolicy::load_checked(&bytes).with_context(|| format!("{}", path.display()))
+/// The name of the run's folder; of its parent for FOLDER/last.
+fn run_name(folder: &Path) -> String {
+    let named = if folder.ends_with(LAST) { folder.parent().unwrap_or(folder) } else { folder };
+    let whole = named.canonicalize().unwrap_or_else(|_| named.to_owned());
+    whole.file_name().map_or_else(|| "gleaner".to_owned(), |name| name.display().to_string())
 }
 
-/// States from the first, a middle and a late slot of flights with few, usual and many devices.
+/// States from early and later slots of flights with 1, 6 and 12 devices.
 fn golden_observations(world: &Arc<World>) -> Result<Vec<Tokens>> {
     let mut observations = Vec::new();
     for (index, devices) in [1, 6, 12].into_iter().enumerate() {
@@ -105,7 +103,7 @@ fn golden_observations(world: &Arc<World>) -> Result<Vec<Tokens>> {
 
 fn card_text(
     card: &ModelCard,
-    learned: &Learned,
+    snapshot: &Snapshot,
     policy: &mut TractPolicy,
     world: &Arc<World>,
     arguments: &Arguments,
@@ -122,20 +120,23 @@ fn card_text(
         text,
         "| steps | {} slots flown, {} updates: the best of {} updates by mean hypervolume on 60 validation \
          realizations |",
-        card.steps, learned.update, learned.settings.updates
+        card.steps, snapshot.update, snapshot.settings.updates
     )?;
     writeln!(text, "| trained in | {} |", card.scenario)?;
     writeln!(text, "| city hash | `{:#018x}` |", card.city_hash)?;
     writeln!(text, "| golden pairs | {}, in the file |", policy.goldens().len())?;
     let steps = card.command.replace(" && ", "\n");
-    writeln!(text, "\nTrained with, each from what the one before had left:\n\n```text\n{steps}\n```")?;
     writeln!(
         text,
-        "\nMeasured on {} evaluation realizations that were neither trained on nor used to choose parameters, in \
-         the default city; K = 6 with the exported file in tract, the others with the trainer's own forward pass, \
-         which agrees with it; GREEDY on the same realizations, and the oracle, \
-         a planner that knows map, channel and devices; nobody can have more data in the mean than the proven bound. \
-         Reproduce one setting with\n\n```sh\ncargo run --release -p gleaner-host-trainer -- evaluate --model {} --scenario \
+        "\nTrained with these commands, each on the result of the one before:\n\n```text\n{steps}\n```"
+    )?;
+    writeln!(
+        text,
+        "\nMeasured on {} evaluation realizations that were used neither for training nor to choose parameters, in \
+         the default city; K = 6 with the exported file in tract, the others with the trainer's forward pass, which \
+         gives the same decisions. GREEDY flew the same realizations. The oracle is a planner with full knowledge of \
+         map, channel and devices. The proven bound is an upper bound of the mean data of any policy. Reproduce one \
+         setting with\n\n```sh\ncargo run --release -p gleaner-host-trainer -- evaluate --model {} --scenario \
          rd --devices 6 --battery 80\n```",
         arguments.realizations,
         arguments.model.display()
@@ -150,10 +151,10 @@ fn card_text(
         let Setting { kind, devices, .. } = asked;
         let drawn = realizations(world, &asked.scenario(), arguments.realizations)?;
         let greedy = evaluate_greedy(world, &drawn);
-        // The flying engine answers one question at a time, the learner's network a thousand.
+        // The engine for the aircraft makes one decision at a time, the trainer's network a thousand.
         let table = match devices {
             6 => evaluate(world, &drawn, &mut Engine(policy))?,
-            _ => evaluate(world, &drawn, &mut Network::new(Shape::actor(), &learned.actor))?,
+            _ => evaluate(world, &drawn, &mut Network::new(Shape::actor(), &snapshot.actor))?,
         };
         let limit = oracle::known(&lines, asked, arguments.realizations);
         writeln!(summary, "{}", summary_row(asked, &table, &greedy, limit.as_ref()))?;
@@ -190,8 +191,9 @@ fn summary_row(asked: Setting, table: &Table, greedy: &Table, limit: Option<&Ora
 
 fn scenario_name(settings: &Settings) -> String {
     let usual = format!(
-        "default city; RD {:.0} %, RB {:.0} %, other zones {:.0} % of the missions; {:.0} % of them with 1 to 12 \
+        "{}; RD {:.0} %, RB {:.0} %, other zones {:.0} % of the missions; {:.0} % of them with 1 to 12 \
          devices and 50 to 120 battery units, the others K = 6, B = 80",
+        settings.site.as_ref().map_or_else(|| "default city".to_owned(), |site| format!("city {site}")),
         100.0 * settings.share_rd,
         100.0 * settings.share_rb,
         100.0 * (1.0 - settings.share_rd - settings.share_rb),
@@ -207,10 +209,20 @@ fn scenario_name(settings: &Settings) -> String {
     )
 }
 
-fn head_commit() -> Result<String> {
-    let output = Command::new("git").args(["rev-parse", "HEAD"]).output()?;
-    if !output.status.success() {
-        bail!("git rev-parse HEAD failed");
+/// The commit of the git repository here, if there are both.
+fn head_commit() -> Option<String> {
+    let output = Command::new("git").args(["rev-parse", "HEAD"]).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn model_is_named_after_the_run() {
+        assert_eq!(run_name(Path::new("runs/mine")), "mine");
+        assert_eq!(run_name(Path::new("runs/mine/last")), "mine");
+        assert_eq!(run_name(Path::new("..")), run_name(&Path::new("..").canonicalize().unwrap()));
     }
-    Ok(String::from_utf8(output.stdout)?.trim().to_owned())
 }

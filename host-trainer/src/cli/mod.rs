@@ -1,52 +1,66 @@
-//! The command line: parsing validates, the commands do.
+//! The command line: one file per command.
 
+mod distil;
 mod evaluate;
 mod export;
+mod mismatch;
+mod model;
 mod oracle;
+mod refine;
 mod report;
-mod systems;
+mod scenario;
+mod session;
+mod site;
+mod subject;
 mod train;
 
+pub use session::Interrupted;
+
 use anyhow::{Context, Result};
-use clap::{Parser, Subcommand};
-use gleaner_host_trainer::keep::snapshot::Learned;
+use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
+use gleaner_host_trainer::keep::snapshot::Snapshot;
 use gleaner_host_trainer::keep::whole;
-use gleaner_host_trainer::systems::System;
+use gleaner_host_trainer::systems::{self, System};
 use std::path::Path;
 
-/// Learns, evaluates and exports policies for Gleaner.
+/// Trains, evaluates and exports policies for Gleaner.
 #[derive(Debug, Parser)]
 #[command(name = "gleaner-train", version)]
-pub struct Arguments {
+struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Train a policy; goes on from the last checkpoint in --out if there is one.
-    Train(train::TrainArguments),
-    /// Teach a policy what a planner with full knowledge does; resumes like train. Of the settings it uses the
-    /// missions, the batch (batch x preferences lessons), the replay size and the learning rates.
-    Distil(train::DistilArguments),
-    /// Let a policy that was taught learn from its own flights (proximal policy optimisation); resumes like train.
-    Refine(train::RefineArguments),
-    /// Print the paper's metrics of a model, a checkpoint and GREEDY.
-    Evaluate(evaluate::Arguments),
-    /// Find out what a planner that knows map, channel and devices reaches: what policies are measured against.
+    /// Train a policy by trial and error; continues from the checkpoint in --out if there is one.
+    Train(Box<train::Arguments>),
+    /// Train a policy to imitate a planner with full knowledge; continues as train does. Of the settings it uses the
+    /// missions, the batch (batch x preferences examples), the replay capacity and the learning rates.
+    Distil(Box<distil::Arguments>),
+    /// Refine a trained policy from its own flights (proximal policy optimisation); continues as train does.
+    Refine(Box<refine::Arguments>),
+    /// Print the paper's metrics of a model, a run and GREEDY.
+    Evaluate(Box<evaluate::Arguments>),
+    /// Compute what a planner with full knowledge of map, channel and devices reaches.
     Oracle(oracle::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
     Export(export::Arguments),
-    /// Make one page with all tables and figures of the paper from models and runs, and the CSV files behind it; goes on
-    /// where it was stopped.
+    /// Make one page with all tables and figures of the paper from models and runs, and the CSV files behind it;
+    /// continues an interrupted measurement.
     Report(report::Arguments),
 }
 
-pub fn run(arguments: &Arguments) -> Result<()> {
-    match &arguments.command {
-        Command::Train(arguments) => train::run(arguments),
-        Command::Distil(arguments) => train::distil(arguments),
-        Command::Refine(arguments) => train::refine(arguments),
+/// Parses the command line and runs the command.
+pub fn run() -> Result<()> {
+    let matches = Arguments::command().get_matches();
+    let mut arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let empty = ArgMatches::default();
+    let own = matches.subcommand().map_or(&empty, |(_, own)| own);
+    match &mut arguments.command {
+        Command::Train(arguments) => train::run(arguments, own),
+        Command::Distil(arguments) => distil::run(arguments),
+        Command::Refine(arguments) => refine::run(arguments),
         Command::Evaluate(arguments) => evaluate::run(arguments),
         Command::Oracle(arguments) => oracle::run(arguments),
         Command::Export(arguments) => export::run(arguments),
@@ -54,17 +68,40 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     }
 }
 
-/// So that a kill or a full disk leaves the old file or the new one.
+/// Replaces a file atomically; makes its folder if it does not exist.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
     whole::write(path, bytes).with_context(|| path.display().to_string())
 }
 
-/// The best parameters of the run in `folder`, which must be of this system.
-fn learned_of(system: System, folder: &Path) -> Result<Learned> {
-    Learned::load_of(system, folder)?.with_context(|| {
-        format!(
-            "{}: no run has been validated here yet; wait for its first line or check --run",
-            folder.display()
-        )
-    })
+/// The best parameters of the run in `folder`.
+fn snapshot_in(folder: &Path) -> Result<(System, Snapshot)> {
+    systems::load(folder)?.with_context(|| no_snapshot(folder))
+}
+
+/// As [`snapshot_in`] where only one system is possible.
+fn snapshot_of(system: System, folder: &Path) -> Result<Snapshot> {
+    systems::load_of(system, folder)?.with_context(|| no_snapshot(folder))
+}
+
+fn no_snapshot(folder: &Path) -> String {
+    format!("{}: no parameters yet; wait for the run's first validation, or check the path", folder.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_line_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn misspelled_subcommand_gets_a_suggestion() {
+        let error = Arguments::try_parse_from(["gleaner-train", "evalute"]).unwrap_err().to_string();
+        assert!(error.contains("evaluate"), "{error}");
+    }
 }

@@ -19,24 +19,24 @@ const SHIPPED: &str = "models/oracle.jsonl";
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The file of the results, one JSON object a line. What it has already is not done again.
+    /// The file of the results, one JSON object per line. Settings that it has already are not computed again.
     #[arg(long)]
     out: PathBuf,
     /// Evaluation realizations, numbers 0 to N - 1.
     #[arg(long, default_value_t = 100)]
     realizations: u64,
-    /// Tours that are tried per mission and preference, twice.
+    /// Tours per search; two searches per mission and preference.
     #[arg(long, default_value_t = 100_000)]
     tours: u32,
-    /// Prove how much of the data can be had at most, too, looking at so many parts of each mission's possibilities; 2000
-    /// take seconds per mission. 0 proves nothing.
+    /// Prove an upper bound of the collected data, with this many nodes of each mission's search tree; 2000 take seconds
+    /// per mission. 0 proves no bound.
     #[arg(long, value_name = "PARTS", default_value_t = 0)]
     bound: u32,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 || arguments.tours == 0 {
-        bail!("nothing to do: give at least one of --realizations and --tours");
+        bail!("--realizations and --tours must be at least 1");
     }
     let mut lines = if arguments.out.exists() { read(&arguments.out)? } else { Vec::new() };
     let world = Arc::new(World::default_world());
@@ -76,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What the best tours bring that are found, by preference and mission.
+/// Reward of the best tours found, by preference and mission.
 pub(super) fn plan(
     rates: &Rates,
     drawn: &[(Seed, Realization)],
@@ -96,7 +96,7 @@ pub(super) fn plan(
     Missions((0..test_preferences().len()).map(of_preference).collect())
 }
 
-/// Percent of the data that nobody can exceed, by mission; `planned` is what can be had.
+/// Upper bound of the data, percent, by mission. `planned` is the lower bound.
 pub(super) fn prove(
     rates: &Rates,
     drawn: &[(Seed, Realization)],
@@ -121,24 +121,24 @@ pub(super) fn prove(
     bounds
 }
 
-/// The settings in the named file, or in the shipped one if it is there.
+/// The settings in the named file, or in the shipped one if it exists.
 pub(super) fn read_or_shipped(named: Option<&Path>) -> Result<Vec<OracleSetting>> {
     let shipped = Path::new(SHIPPED);
     named.or_else(|| shipped.exists().then_some(shipped)).map_or_else(|| Ok(Vec::new()), read)
 }
 
-/// One setting's first `realizations`, if the lines have them.
+/// The first `realizations` of one setting, if the lines have them.
 pub(super) fn known(lines: &[OracleSetting], setting: Setting, realizations: u64) -> Option<OracleSetting> {
     // A later line of the file replaces an earlier one.
     lines.iter().rev().filter(|line| line.is_of(setting)).find_map(|line| line.first(realizations))
 }
 
-/// The settings in a file that this command wrote.
+/// The settings in a file of this command.
 fn read(path: &Path) -> Result<Vec<OracleSetting>> {
     let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
     let parse = |(index, line): (usize, &str)| -> Result<OracleSetting> {
         let place =
-            || format!("{}: line {} is not what `gleaner-train oracle` writes", path.display(), index + 1);
+            || format!("{}: line {} is not a line of `gleaner-train oracle`", path.display(), index + 1);
         let setting: OracleSetting = serde_json::from_str(line).with_context(place)?;
         if setting.missions.0.len() != test_preferences().len() {
             bail!("{}: line {}: not eleven preferences", path.display(), index + 1);
@@ -166,7 +166,7 @@ fn summary(setting: &OracleSetting) -> String {
     let energy = |index: usize| -mean(&mut setting.missions.0[index].iter().map(|reward| reward[1]));
     let proven = match &setting.upper_bound_percent[..] {
         [] => String::new(),
-        bounds => format!(", at most {:.1} % can be had", mean(&mut bounds.iter().copied())),
+        bounds => format!(", upper bound {:.1} %", mean(&mut bounds.iter().copied())),
     };
     format!(
         "{} K={} B={}: {:.1} % of the data for {:.1} units{proven}; least energy {:.2}",
@@ -179,7 +179,7 @@ fn summary(setting: &OracleSetting) -> String {
     )
 }
 
-/// For one of the two.
+/// A progress bar over missions.
 pub(super) fn bar(drawn: &[(Seed, Realization)], name: String) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} missions, {eta} left");
     let bar = ProgressBar::new(drawn.len() as u64).with_message(name);

@@ -1,77 +1,86 @@
 //! `gleaner-train report`.
 
-use super::systems::System;
+use super::site::{SiteArguments, fingerprint};
+use super::subject::Subject;
 use super::{oracle, write_whole};
 use anyhow::{Result, bail};
-use gleaner_host_trainer::judge::evaluation::{fly_all, fly_greedy, realizations, test_preferences};
+use gleaner_host_trainer::env::site::Site;
+use gleaner_host_trainer::judge::evaluation::{fly_all, fly_greedy, test_preferences};
 use gleaner_host_trainer::judge::explanation::{track, watch};
 use gleaner_host_trainer::judge::paper::Setting;
 use gleaner_host_trainer::judge::robustness::{repeat_flights, world_with};
 use gleaner_host_trainer::keep::curves;
 use gleaner_host_trainer::keep::parts::{Parts, Source};
+use gleaner_host_trainer::planner::oracle::OracleSetting;
 use gleaner_host_trainer::report::{self, Detail, Report};
-use gleaner_host_trainer::systems::System as Learner;
+use gleaner_host_trainer::systems::System;
 use gleaner_policy::Preference;
-use gleaner_world::{Fading, Realization, ScenarioKind, Seed, World};
+use gleaner_units::BatteryUnits;
+use gleaner_world::{Fading, Realization, ScenarioKind, Seed};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-/// What is reported on when nothing is named: the model, and a folder for each of the paper's systems.
+/// Defaults: the shipped model, and a folder for each of the paper's systems.
 const SHIPPED: &str = "models/gleaner.onnx";
 const SHIPPED_RUNS: &str = "models/paper";
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// An ONNX model, flown by the engine that flies it on board; NAME=FILE gives it a name. Repeatable. The first
-    /// system of all is looked at more closely: fading, attention, trajectories. Without any --model and --run: all
-    /// that is shipped in models/.
+    /// An ONNX model, in the engine that flies it on board; NAME=FILE gives it a name. Repeatable. The first system of
+    /// all is measured in detail: fading, attention, trajectories. Without --model and --run: all systems in models/.
     #[arg(long, value_name = "[NAME=]FILE")]
     model: Vec<String>,
-    /// The folder of a run: its best parameters, flown by the learner's network, and its learning curve; NAME=FOLDER
-    /// gives it a name. Repeatable.
+    /// The folder of a run: its best parameters and its learning curve; NAME=FOLDER gives it a name. Repeatable.
     #[arg(long, value_name = "[NAME=]FOLDER")]
     run: Vec<String>,
-    /// The folder of a run of which only the learning curve is shown, such as the one that made a model. Repeatable.
+    /// The folder of a run of which the report shows the learning curve only. Repeatable.
     #[arg(long, value_name = "[NAME=]FOLDER")]
     curve: Vec<String>,
-    /// What `gleaner-train oracle` wrote: the oracle for every table. The default is the shipped one.
+    /// A file of `gleaner-train oracle`, for every table [default: the shipped one].
     #[arg(long, value_name = "FILE")]
     oracle: Option<PathBuf>,
     /// Folder of the page, the CSV files and the finished parts.
     #[arg(long, default_value = "target/report")]
     out: PathBuf,
+    #[command(flatten)]
+    site: SiteArguments,
     /// Evaluation realizations per setting, numbers 0 to N - 1.
     #[arg(long, default_value_t = 100)]
     realizations: u64,
     /// Repeats of the fading test.
     #[arg(long, default_value_t = 30)]
     fading_repeats: u32,
-    /// Evaluation realization that is drawn as an example.
+    /// Evaluation realization of the example figures.
     #[arg(long, default_value_t = 0)]
     example: u64,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
-        bail!("--realizations 0: nothing to fly; give at least 1");
+        bail!("--realizations 0: no mission to fly; give at least 1");
     }
     let chosen = Chosen::by(arguments);
     let mut systems = chosen.systems()?;
-    let oracle = oracle::read_or_shipped(arguments.oracle.as_deref())?;
+    let is_default_site = arguments.site.is_default();
+    // The oracle's file is about the default city.
+    let lines = match &arguments.oracle {
+        None if !is_default_site => Vec::new(),
+        named => oracle::read_or_shipped(named.as_deref())?,
+    };
+    let oracle = same_realizations(&lines, arguments.realizations);
     let curves = chosen.curves()?;
-    let desk = Desk::open(arguments, systems.len())?;
-    let mut shown = vec![desk.greedy()?];
+    let measurement = Measurement::open(arguments, systems.len())?;
+    let mut shown = vec![measurement.greedy()?];
     for system in &mut systems {
-        shown.push(desk.evaluate(system)?);
+        shown.push(measurement.evaluate(system)?);
     }
-    let detail = systems.first_mut().map(|system| desk.look_closer(system)).transpose()?;
-    desk.bar.finish_and_clear();
-    let world = &desk.world;
+    let detail = systems.first_mut().map(|system| measurement.detail(system)).transpose()?;
+    measurement.bar.finish_and_clear();
+    let world = measurement.site.world();
     let report = Report {
         command: command_line(),
         machine: machine(),
@@ -92,25 +101,25 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What measures and tells.
-struct Desk<'a> {
+/// Measures parts and shows the progress.
+struct Measurement<'a> {
     arguments: &'a Arguments,
-    world: Arc<World>,
+    site: Site,
     parts: Parts,
     bar: ProgressBar,
 }
 
-impl<'a> Desk<'a> {
-    fn open(arguments: &'a Arguments, systems: usize) -> Result<Desk<'a>> {
+impl<'a> Measurement<'a> {
+    fn open(arguments: &'a Arguments, systems: usize) -> Result<Measurement<'a>> {
         let parts = Parts::open(&arguments.out.join("parts"))?;
         let closer = if systems == 0 { 0 } else { 4 + 2 + 2 };
         let bar = ProgressBar::new((Setting::ALL.len() * (systems + 1) + systems + closer) as u64);
         let style = ProgressStyle::with_template("{bar:30} {pos}/{len} parts, {elapsed}, now {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        Ok(Desk { arguments, world: Arc::new(World::default_world()), parts, bar })
+        Ok(Measurement { arguments, site: arguments.site.site()?, parts, bar })
     }
 
-    /// One part: from the folder if it is there, and told in any case.
+    /// One part, from the folder if it is there.
     fn part<T: Serialize + DeserializeOwned>(
         &self,
         system: &str,
@@ -119,27 +128,36 @@ impl<'a> Desk<'a> {
         measure: impl FnOnce() -> Result<T>,
     ) -> Result<T> {
         self.bar.set_message(format!("{system}: {what}"));
-        let city = self.world.city().fingerprint();
+        let city = fingerprint(&self.site);
         let count = self.arguments.realizations;
-        let facts = format!("{identity}, {what}, {count} realizations, city {city:016x}");
+        let facts = format!("{identity}, {what}, {count} realizations, city {city}");
         let (part, source) = self.parts.part(&facts, measure)?;
         self.bar.inc(1);
         match source {
-            Source::Repaired => self.tell(&format!("{system}: {what}: damaged part, measured again")),
+            Source::Repaired => self.print(&format!("{system}: {what}: damaged part, measured again")),
             Source::Measured if !std::io::stderr().is_terminal() => {
-                self.tell(&format!("{system}: {what}: done"));
+                self.print(&format!("{system}: {what}: done"));
             }
             Source::Measured | Source::Kept => {}
         }
         Ok(part)
     }
 
-    fn tell(&self, line: &str) {
+    fn print(&self, line: &str) {
         self.bar.suspend(|| eprintln!("{line}"));
     }
 
     fn draw(&self, setting: Setting) -> Result<Vec<(Seed, Realization)>> {
-        Ok(realizations(&self.world, &setting.scenario(), self.arguments.realizations)?)
+        let scenario = self
+            .site
+            .scenario(setting.kind)
+            .with_devices(setting.devices)
+            .with_battery(BatteryUnits(f32::from(setting.battery)));
+        let draw = |number| {
+            let seed = Seed::evaluation(number);
+            Ok((seed, self.site.realization(&scenario, seed)?))
+        };
+        (0..self.arguments.realizations).map(draw).collect()
     }
 
     fn greedy(&self) -> Result<report::System> {
@@ -147,7 +165,7 @@ impl<'a> Desk<'a> {
             .iter()
             .map(|&setting| {
                 self.part("GREEDY", "greedy", &name(setting), || {
-                    Ok(fly_greedy(&self.world, &self.draw(setting)?))
+                    Ok(fly_greedy(self.site.world(), &self.draw(setting)?))
                 })
             })
             .collect::<Result<_>>()?;
@@ -162,7 +180,7 @@ impl<'a> Desk<'a> {
         })
     }
 
-    fn evaluate(&self, system: &mut System) -> Result<report::System> {
+    fn evaluate(&self, system: &mut Subject) -> Result<report::System> {
         let identity = system.identity.clone();
         let missions = Setting::ALL
             .iter()
@@ -170,24 +188,24 @@ impl<'a> Desk<'a> {
                 self.part(&system.name, &identity, &name(setting), || {
                     let drawn = self.draw(setting)?;
                     let preferences = test_preferences();
-                    Ok(fly_all(&self.world, &drawn, &preferences, system.engine.decider().as_mut())?)
+                    Ok(fly_all(self.site.world(), &drawn, &preferences, system.policy.decider().as_mut())?)
                 })
             })
             .collect::<Result<_>>()?;
         let facts = format!("{identity}, {}", machine());
         let latency =
-            self.part(&system.name, &facts, "inference time", || system.engine.latency(&self.world))?;
+            self.part(&system.name, &facts, "inference time", || system.policy.latency(self.site.world()))?;
         Ok(report::System {
             name: system.name.clone(),
             origin: system.origin.clone(),
-            parameters: Some(system.engine.parameters()),
+            parameters: Some(system.policy.parameters()),
             latency: Some(latency),
             missions,
         })
     }
 
-    /// What only the first learned system is put through: the paper does it with MOSAC-ATT alone.
-    fn look_closer(&self, system: &mut System) -> Result<Detail> {
+    /// The measurements of the first system only. The paper makes them for MOSAC-ATT.
+    fn detail(&self, system: &mut Subject) -> Result<Detail> {
         let (name, identity) = (system.name.clone(), system.identity.clone());
         let mut detail = Detail {
             system: name.clone(),
@@ -202,8 +220,8 @@ impl<'a> Desk<'a> {
             let mut fly = |what: &str, fading| {
                 let what = format!("{what} channel, {repeats} repeats, {kind}");
                 self.part(&name, &identity, &what, || {
-                    let world = world_with(self.world.city().clone(), fading);
-                    Ok(repeat_flights(&world, &drawn, repeats, system.engine.decider().as_mut())?)
+                    let world = world_with(self.site.world().city().clone(), fading);
+                    Ok(repeat_flights(&world, &drawn, repeats, system.policy.decider().as_mut())?)
                 })
             };
             detail.fading.push((kind, fly("regular", Fading::None)?, fly("fading", Fading::Rayleigh)?));
@@ -218,7 +236,7 @@ impl<'a> Desk<'a> {
                     drawn.push(example.clone());
                     drawn.len() - 1
                 });
-                Ok(watch(&self.world, &drawn, place, preference, system.engine.decider().as_mut())?)
+                Ok(watch(self.site.world(), &drawn, place, preference, system.policy.decider().as_mut())?)
             })?;
             detail.gazes.extend(gaze);
         }
@@ -229,7 +247,7 @@ impl<'a> Desk<'a> {
                 let preferences = [1.0, 0.5, 0.0].into_iter().filter_map(Preference::new);
                 preferences
                     .map(|preference| {
-                        Ok(track(&self.world, &example, preference, system.engine.decider().as_mut())?)
+                        Ok(track(self.site.world(), &example, preference, system.policy.decider().as_mut())?)
                     })
                     .collect()
             })?;
@@ -240,7 +258,7 @@ impl<'a> Desk<'a> {
 
     fn example(&self, kind: ScenarioKind) -> Result<(Seed, Realization)> {
         let seed = Seed::evaluation(self.arguments.example);
-        Ok((seed, Realization::draw(self.world.city(), &kind.scenario(), seed)?))
+        Ok((seed, self.site.realization(&self.site.scenario(kind), seed)?))
     }
 }
 
@@ -248,10 +266,10 @@ fn name(setting: Setting) -> String {
     format!("{}, K = {}, B = {}", setting.scenario_name(), setting.devices, setting.battery)
 }
 
-/// A name, if it was given one, and where it lies.
+/// A name, if given, and a path.
 type Named = (Option<String>, PathBuf);
 
-/// What is reported on.
+/// The subjects of the report.
 struct Chosen {
     models: Vec<Named>,
     runs: Vec<Named>,
@@ -267,7 +285,7 @@ impl Chosen {
             curves: named(&arguments.curve),
         };
         if chosen.models.is_empty() && chosen.runs.is_empty() {
-            let runs = Learner::ALL
+            let runs = System::ALL
                 .map(|system| (Some(system.title().to_owned()), Path::new(SHIPPED_RUNS).join(system.name())));
             chosen.models.push((None, SHIPPED.into()));
             chosen.runs.extend(runs.into_iter().filter(|(_, folder)| folder.is_dir()));
@@ -275,23 +293,26 @@ impl Chosen {
         chosen
     }
 
-    fn systems(&self) -> Result<Vec<System>> {
+    fn systems(&self) -> Result<Vec<Subject>> {
         let mut systems = Vec::new();
         for (name, path) in &self.models {
-            systems.push(System::model(name.as_deref(), path)?);
+            systems.push(Subject::model(name.as_deref(), path)?);
         }
         for (name, folder) in &self.runs {
-            systems.push(System::run(name.as_deref(), folder)?);
+            systems.push(Subject::run(name.as_deref(), folder)?);
         }
         for (index, system) in systems.iter().enumerate() {
             if systems[..index].iter().any(|other| other.name == system.name) {
-                bail!("two systems are called {}; tell them apart with --model NAME=FILE", system.name);
+                bail!(
+                    "two systems have the name {}; name them with --model NAME=FILE or --run NAME=FOLDER",
+                    system.name
+                );
             }
         }
         Ok(systems)
     }
 
-    /// The learning curves; a run may have none yet, what was asked for its curve may not.
+    /// The learning curves. A --run may have none yet, a --curve must have one.
     fn curves(&self) -> Result<Vec<(String, Vec<curves::Point>)>> {
         let of = |(name, folder): &Named| -> Result<(String, Vec<curves::Point>)> {
             if !folder.is_dir() {
@@ -305,12 +326,18 @@ impl Chosen {
             let curve = of(named)?;
             if curve.1.is_empty() {
                 let folder = named.1.display();
-                bail!("{folder}: no learning curve here yet; wait for its first line or check --curve");
+                bail!("{folder}: no learning curve yet; wait for its first point, or check --curve");
             }
             all.push(curve);
         }
         Ok(all)
     }
+}
+
+/// The oracle on the realizations of the report, so that means are over the same missions. Settings with fewer
+/// realizations are left out.
+fn same_realizations(lines: &[OracleSetting], count: u64) -> Vec<OracleSetting> {
+    lines.iter().filter_map(|line| line.first(count)).collect()
 }
 
 /// `NAME=PATH`, or a path alone.
@@ -321,7 +348,7 @@ fn named(argument: &str) -> Named {
     }
 }
 
-/// As it was typed.
+/// The command line of this program.
 fn command_line() -> String {
     let words =
         std::env::args().skip(1).map(|word| if word.contains(' ') { format!("'{word}'") } else { word });
@@ -334,4 +361,28 @@ fn machine() -> String {
     let model = info.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     model
         .map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| format!("{}, one thread", name.trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gleaner_host_trainer::judge::evaluation::Missions;
+
+    #[test]
+    fn oracle_is_cut_to_the_realizations_of_the_report() {
+        let line = |realizations: u64| OracleSetting {
+            scenario: "rd".into(),
+            devices: 6,
+            battery: 80,
+            realizations,
+            missions: Missions(vec![(0..realizations).map(|i| [i as f32, -32.0]).collect(); 11]),
+            upper_bound_percent: vec![99.0; realizations as usize],
+            bound_parts: 0,
+        };
+        let cut = same_realizations(&[line(100), line(3)], 5);
+        assert_eq!(cut.len(), 1, "a setting with 3 of 5 realizations does not compare");
+        assert_eq!(cut[0].missions.realizations(), 5);
+        assert_eq!(cut[0].missions.table().coverage(), 2.0);
+        assert_eq!(cut[0].upper_bound_percent.len(), 5);
+    }
 }

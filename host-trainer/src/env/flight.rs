@@ -1,20 +1,18 @@
-//! A mission on the grid with the guard on: what the learner flies.
+//! A mission on the grid under the safety envelope: an episode of the learner.
 
-use crate::net::Sample;
-use crate::observe::tokens::{Observation, normalise};
 use gleaner_guard::Guard;
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
-use gleaner_world::{Episode, Realization, ScenarioError, Seed, Stream, World};
+use gleaner_world::{City, Episode, Realization, ScenarioError, Seed, Stream, World};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// The data that one slot brings, in percent of all there was, and minus its energy in battery units: the
-/// vector reward (paper, eq. 14), in the units of the paper's figures.
+/// The vector reward of one slot (paper, eq. 14): collected data in percent of the initial data, and minus the energy
+/// in battery units.
 pub type Reward = [f32; 2];
 
-/// An episode that only takes actions inside the envelope, under one preference.
+/// An episode that only takes actions inside the safety envelope, under one preference.
 #[derive(Clone, Debug)]
 pub struct Flight {
     episode: Episode,
@@ -23,19 +21,20 @@ pub struct Flight {
     start: Cell,
     total: Reward,
     reports: Option<Reports>,
+    map: Option<Arc<City>>,
 }
 
-/// What has arrived of the devices' reports, where not all do.
+/// The reports received from the devices, when some are lost.
 #[derive(Clone, Debug)]
 struct Reports {
     missing: f64,
     rng: ChaCha8Rng,
-    /// By device: whether this slot's report arrived, and the data that was reported last.
+    /// By device: whether the report of this slot arrived, and the remaining data of the last report.
     last: Vec<(bool, f32)>,
 }
 
 impl Reports {
-    fn listen(&mut self, episode: &Episode) {
+    fn receive(&mut self, episode: &Episode) {
         for (last, device) in self.last.iter_mut().zip(episode.devices()) {
             *last = if self.rng.random_bool(self.missing) {
                 (false, last.1)
@@ -47,7 +46,7 @@ impl Reports {
 }
 
 impl Flight {
-    /// Starts a mission, with no reserve: the paper's safety controller.
+    /// Starts a mission without a reserve, as the paper's safety controller does.
     ///
     /// # Errors
     /// The realization does not belong to this world.
@@ -64,24 +63,79 @@ impl Flight {
         let map = CellSet::full(world.city().grid());
         let guard = Guard::new(&map, realization.terminal(), BatteryUnits(0.0))
             .expect("the terminal of a scenario lies inside a map of more than one cell");
-        Ok(Flight { episode, guard, preference, start: realization.start(), total: [0.0; 2], reports: None })
+        Ok(Flight {
+            episode,
+            guard,
+            preference,
+            start: realization.start(),
+            total: [0.0; 2],
+            reports: None,
+            map: None,
+        })
     }
 
-    /// Loses this share of the reports, each by chance: the device is then not heard, and its data is that of the
-    /// report before.
+    /// Drops each report with this probability. A device without a report counts as not heard, and its remaining data
+    /// stays that of the last report.
     #[must_use]
     pub fn with_reports_missing(mut self, share: f64, seed: Seed) -> Flight {
         if share > 0.0 {
             let last = self.episode.devices().iter().map(|device| (true, device.remaining_units)).collect();
             let mut reports =
                 Reports { missing: share, rng: seed.repeat(u32::MAX).rng(Stream::Choices), last };
-            reports.listen(&self.episode);
+            reports.receive(&self.episode);
             self.reports = Some(reports);
         }
         self
     }
 
-    /// What the policy sees now.
+    /// Gives the policy this city map in place of the true one: another building map on board.
+    ///
+    /// # Panics
+    /// When its grid is another one.
+    #[must_use]
+    pub fn with_map(mut self, map: Arc<City>) -> Flight {
+        assert_eq!(map.grid(), self.episode.world().city().grid(), "the map must cover the city");
+        self.map = Some(map);
+        self
+    }
+
+    /// The city map that the policy has.
+    #[must_use]
+    pub fn map(&self) -> &City {
+        self.map.as_deref().unwrap_or_else(|| self.episode.world().city())
+    }
+
+    /// Whether the policy has the same map in both flights.
+    #[must_use]
+    pub fn shares_map(&self, other: &Flight) -> bool {
+        match (&self.map, &other.map) {
+            (None, None) => Arc::ptr_eq(self.episode.world(), other.episode.world()),
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
+            _ => false,
+        }
+    }
+
+    /// Whether a device's report of this slot was received, and its remaining data by its last report, data units.
+    ///
+    /// # Panics
+    /// When there is no such device.
+    #[must_use]
+    pub fn report(&self, device: usize) -> (bool, f32) {
+        match &self.reports {
+            Some(reports) => reports.last[device],
+            None => (true, self.episode.devices()[device].remaining_units),
+        }
+    }
+
+    /// The devices as reported to the aircraft.
+    pub fn device_states(&self) -> impl Iterator<Item = DeviceState> {
+        self.episode.devices().iter().enumerate().map(|(index, device)| {
+            let (arrived, remaining) = self.report(index);
+            DeviceState { cell: device.cell, remaining, snr: arrived.then_some(device.snr) }
+        })
+    }
+
+    /// The policy's observation of the current slot.
     #[must_use]
     pub fn tokens(&self) -> Tokens {
         let situation = Situation {
@@ -90,44 +144,25 @@ impl Flight {
             spare: self.spare(),
             terminal: self.episode.terminal(),
             preference: self.preference,
-            sight: self.episode.world().city(),
+            sight: self.map(),
         };
-        let devices = self.episode.devices().iter().enumerate().map(|(index, device)| {
-            let (arrived, remaining) = match &self.reports {
-                Some(reports) => reports.last[index],
-                None => (true, device.remaining_units),
-            };
-            DeviceState { cell: device.cell, remaining, snr: arrived.then_some(device.snr) }
-        });
-        Tokens::build(&situation, devices).0
+        Tokens::build(&situation, self.device_states()).0
     }
 
-    /// The same as the network's first layer sees it.
-    #[must_use]
-    pub fn sample(&self) -> Sample {
-        normalise(&self.tokens())
-    }
-
-    /// The same for the replay memory.
-    #[must_use]
-    pub fn observe(&self) -> Observation {
-        Observation::new(&self.tokens())
-    }
-
-    /// What the battery holds beyond the way to the terminal.
+    /// Battery beyond what the way to the terminal needs.
     #[must_use]
     pub fn spare(&self) -> BatteryUnits {
         let battery = self.episode.battery();
         self.guard.spare(self.episode.uav(), battery).unwrap_or(battery)
     }
 
-    /// Where it began.
+    /// The start cell.
     #[must_use]
     pub const fn start(&self) -> Cell {
         self.start
     }
 
-    /// What the guard allows now.
+    /// The actions that the guard allows now.
     #[must_use]
     pub fn mask(&self) -> ActionMask {
         self.guard.mask(self.episode.uav(), self.episode.battery())
@@ -138,11 +173,11 @@ impl Flight {
     /// # Panics
     /// On an action outside [`Flight::mask`], or when the flight is over.
     pub fn step(&mut self, action: Action) -> Reward {
-        assert!(self.mask().allows(action), "{action:?} is outside the envelope");
-        let step = self.episode.step(action).expect("what the guard allows can be flown");
+        assert!(self.mask().allows(action), "{action:?} is outside the safety envelope");
+        let step = self.episode.step(action).expect("an allowed action can be flown");
         let reward = self.episode.reward(&step);
         if let Some(reports) = &mut self.reports {
-            reports.listen(&self.episode);
+            reports.receive(&self.episode);
         }
         for (total, part) in self.total.iter_mut().zip(reward) {
             *total += part;
@@ -162,19 +197,19 @@ impl Flight {
         self.total
     }
 
-    /// The preference that it is flown under.
+    /// The preference of the mission.
     #[must_use]
     pub const fn preference(&self) -> Preference {
         self.preference
     }
 
-    /// The episode underneath.
+    /// The state of the world.
     #[must_use]
     pub const fn episode(&self) -> &Episode {
         &self.episode
     }
 
-    /// The envelope.
+    /// The safety envelope.
     #[must_use]
     pub const fn guard(&self) -> &Guard {
         &self.guard

@@ -1,10 +1,10 @@
-//! GREEDY, the paper's heuristic: the nearest device, hover until it is empty, the next, home in time.
+//! GREEDY, the paper's heuristic: fly to the nearest device, hover until it is empty, go on to the next, return in time.
 
 use crate::env::flight::Flight;
 use gleaner_units::{Action, Cell};
 
-/// How many devices to visit before going home: the parameterisation of the heuristic. All of them is its best
-/// for data, none its best for energy.
+/// The heuristic, parameterised by the number of devices that it visits before it returns. All devices collect the most
+/// data, none takes the least energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Greedy {
     visits: usize,
@@ -19,8 +19,8 @@ impl Greedy {
         Greedy { visits, emptied: 0, target: None }
     }
 
-    /// The next action: towards the target, hover above it until it is empty, and towards the terminal when the
-    /// visits are done or the guard forbids going on. Moves along the axis with more cells to go first.
+    /// The next action: move to the target and hover above it until it is empty; move to the terminal when the visits
+    /// are done or the guard forbids the next move. Moves along the longer axis first.
     pub fn decide(&mut self, flight: &Flight) -> Action {
         let here = flight.episode().uav();
         let mask = flight.mask();
@@ -28,7 +28,7 @@ impl Greedy {
             Some(device) => flight.episode().devices()[device].cell,
             None => flight.episode().terminal(),
         };
-        // On the terminal before a mission that starts there: any way out, then back.
+        // A mission that starts on its terminal ends with a move into it, so it has to leave first.
         let home = || flight.guard().homeward(here).or_else(|| mask.iter().find(|&a| a != Action::Hover));
         let wish =
             if self.target.is_none() { home() } else { approach(here, towards).or(Some(Action::Hover)) };
@@ -40,8 +40,9 @@ impl Greedy {
 
     fn choose_target(&mut self, flight: &Flight) -> Option<usize> {
         let devices = flight.episode().devices();
+        let remaining_units = |device: usize| flight.report(device).1;
         if let Some(target) = self.target
-            && devices[target].remaining_units <= 0.0
+            && remaining_units(target) <= 0.0
         {
             self.target = None;
             self.emptied += 1;
@@ -51,7 +52,7 @@ impl Greedy {
             self.target = devices
                 .iter()
                 .enumerate()
-                .filter(|(_, device)| device.remaining_units > 0.0)
+                .filter(|(index, _)| remaining_units(*index) > 0.0)
                 .min_by_key(|(_, device)| here.manhattan(device.cell))
                 .map(|(index, _)| index);
         }
@@ -59,7 +60,7 @@ impl Greedy {
     }
 }
 
-/// The move along the axis with more cells to go; `None` when there.
+/// The move along the longer axis; `None` at the destination.
 pub(crate) fn approach(from: Cell, to: Cell) -> Option<Action> {
     let (east, north) = (to.x - from.x, to.y - from.y);
     if east == 0 && north == 0 {

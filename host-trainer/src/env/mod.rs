@@ -1,5 +1,8 @@
-//! Missions and their flights: what the trainer flies.
+//! Missions and flights: the environment of the trainer.
 
+pub mod distribution;
 pub mod flight;
 pub mod greedy;
+pub mod mission;
+pub mod site;
 pub mod variety;

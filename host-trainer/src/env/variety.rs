@@ -1,72 +1,74 @@
-//! The worlds that a policy is refined in: the default city, and others that it will never meet again.
+//! Domain randomisation: the default city, and generated cities with another channel.
 
-use crate::learn::settings::Settings;
-use crate::planner::Rates;
+use crate::env::site::Site;
 use gleaner_units::Db;
 use gleaner_world::{Channel, City, Fading, Seed, Stream, World};
 use rand::RngExt;
 use std::sync::Arc;
 
-/// Generated cities. Evaluations count theirs from 0, these are far from them.
+/// Number of the first generated city. Evaluations count theirs from 0.
 const CITIES_FROM: u64 = 1_000_000;
+/// Generated cities.
 const CITIES: u64 = 200;
-/// How far the noise may be off, dB.
-const NOISE_OFF_DB: f32 = 2.0;
-/// Share of the reports that do not arrive, in the missions over generated cities.
+/// Largest error of the noise level in generated cities, dB.
+const NOISE_ERROR_DB: f32 = 2.0;
+/// Share of the reports that are lost in generated cities.
 const REPORTS_MISSING: f64 = 0.1;
 
-/// The worlds.
+/// The sites of a run.
 pub struct Variety {
-    usual: (Arc<World>, Rates),
-    others: Vec<(Arc<World>, Rates)>,
+    /// The run's own site, then the generated ones.
+    sites: Vec<Site>,
     share: f64,
 }
 
-/// Where a mission is flown, and how well it is heard.
+/// Where a mission is flown.
 pub struct Setting<'a> {
-    /// The city and its channel.
-    pub world: &'a Arc<World>,
-    /// What the planner knows of the channel.
-    pub rates: &'a Rates,
-    /// Share of the reports that do not arrive.
+    /// Position of the site in [`Variety::sites`].
+    pub index: usize,
+    /// The site.
+    pub site: &'a Site,
+    /// Share of the reports that are lost.
     pub reports_missing: f64,
 }
 
 impl Variety {
-    /// Builds the worlds that the settings ask for.
+    /// `site` alone, or with generated cities if their share of the missions is above 0.
     #[must_use]
-    pub fn new(usual: &Arc<World>, settings: &Settings) -> Variety {
-        let count = if settings.share_cities > 0.0 { CITIES } else { 0 };
-        let with_rates = |world: Arc<World>| (Arc::clone(&world), Rates::new(world));
-        let others = (CITIES_FROM..CITIES_FROM + count).map(|number| with_rates(Arc::new(other(number))));
-        Variety {
-            usual: with_rates(Arc::clone(usual)),
-            others: others.collect(),
-            share: settings.share_cities,
-        }
+    pub fn new(site: &Site, share_cities: f64) -> Variety {
+        let count = if share_cities > 0.0 { CITIES } else { 0 };
+        let generated =
+            (CITIES_FROM..CITIES_FROM + count).map(|number| Site::new(Arc::new(generate(number))));
+        Variety { sites: std::iter::once(site.clone()).chain(generated).collect(), share: share_cities }
+    }
+
+    /// All sites; the first is the run's own.
+    #[must_use]
+    pub fn sites(&self) -> &[Site] {
+        &self.sites
     }
 
     /// Where the mission with this number is flown.
     #[must_use]
     pub fn setting(&self, mission: u64) -> Setting<'_> {
         let mut rng = Seed::training(mission).repeat(u32::MAX).rng(Stream::Choices);
-        let elsewhere = !self.others.is_empty() && rng.random_bool(self.share);
-        let ((world, rates), reports_missing) = if elsewhere {
-            (&self.others[rng.random_range(0..self.others.len())], REPORTS_MISSING)
+        let generated = self.sites.len() - 1;
+        let (index, reports_missing) = if generated > 0 && rng.random_bool(self.share) {
+            (1 + rng.random_range(0..generated), REPORTS_MISSING)
         } else {
-            (&self.usual, 0.0)
+            (0, 0.0)
         };
-        Setting { world, rates, reports_missing }
+        Setting { index, site: &self.sites[index], reports_missing }
     }
 }
 
-fn other(number: u64) -> World {
+fn generate(number: u64) -> World {
     let mut rng = Seed::training(number).rng(Stream::Choices);
-    let usual = Channel::default();
+    let nominal = Channel::default();
     let channel = Channel {
-        noise: usual.noise + Db(rng.random_range(-NOISE_OFF_DB..=NOISE_OFF_DB)),
+        noise: nominal.noise + Db(rng.random_range(-NOISE_ERROR_DB..=NOISE_ERROR_DB)),
         fading: if rng.random() { Fading::Rayleigh } else { Fading::None },
-        ..usual
+        ..nominal
     };
     World::new(City::generate(number), channel)
 }

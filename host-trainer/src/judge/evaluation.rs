@@ -25,6 +25,14 @@ pub trait Decider {
     /// The engine's own.
     fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError>;
 
+    /// Like [`Decider::decide`]; the numbers identify the flights from slot to slot, for a decider with a memory.
+    ///
+    /// # Errors
+    /// The engine's own.
+    fn decide_numbered(&mut self, flights: &[(usize, &Flight)]) -> Result<Vec<Action>, DeciderError> {
+        self.decide(&flights.iter().map(|(_, flight)| *flight).collect::<Vec<_>>())
+    }
+
     /// Who looks at whom in the second layer before the next action of this flight; `None` for a system without
     /// attention.
     ///
@@ -265,7 +273,7 @@ pub fn realizations(
         .collect()
 }
 
-/// Flies every realization under one preference.
+/// Flies every realization under each preference.
 ///
 /// # Errors
 /// The decider failed.
@@ -278,21 +286,40 @@ pub fn fly_all(
     preferences: &[Preference],
     decider: &mut dyn Decider,
 ) -> Result<Missions, DeciderError> {
-    let mut flights: Vec<Flight> = preferences
-        .iter()
-        .flat_map(|&preference| {
-            realizations.iter().map(move |(seed, realization)| {
-                Flight::new(world, realization, *seed, preference).expect("drawn for this world")
-            })
-        })
-        .collect();
+    fly_all_as(world, realizations, preferences, decider, |flight, _| flight)
+}
+
+/// Like [`fly_all`]; `prepare` changes each flight before it starts, for example its map or its reports.
+///
+/// # Errors
+/// The decider failed.
+///
+/// # Panics
+/// When the realizations belong to another world.
+pub fn fly_all_as(
+    world: &Arc<World>,
+    realizations: &[(Seed, Realization)],
+    preferences: &[Preference],
+    decider: &mut dyn Decider,
+    prepare: impl Fn(Flight, Seed) -> Flight,
+) -> Result<Missions, DeciderError> {
+    let mut flights: Vec<Flight> = Vec::new();
+    for &preference in preferences {
+        for (seed, realization) in realizations {
+            let flight = Flight::new(world, realization, *seed, preference).expect("drawn for this world");
+            flights.push(prepare(flight, *seed));
+        }
+    }
     loop {
-        let mut active: Vec<&mut Flight> = flights.iter_mut().filter(|flight| !flight.is_over()).collect();
+        let mut active: Vec<(usize, &mut Flight)> =
+            flights.iter_mut().enumerate().filter(|(_, flight)| !flight.is_over()).collect();
         if active.is_empty() {
             break;
         }
-        let actions = decider.decide(&active.iter().map(|flight| &**flight).collect::<Vec<_>>())?;
-        for (flight, action) in active.iter_mut().zip(actions) {
+        let seen: Vec<(usize, &Flight)> =
+            active.iter().map(|(number, flight)| (*number, &**flight)).collect();
+        let actions = decider.decide_numbered(&seen)?;
+        for ((_, flight), action) in active.iter_mut().zip(actions) {
             flight.step(action);
         }
     }
@@ -356,24 +383,4 @@ pub fn evaluate_greedy(world: &Arc<World>, realizations: &[(Seed, Realization)])
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_table_is_what_the_paper_defines() {
-        // Two realizations; the first six preferences bring (10, -2) and (30, -4), the others (50, -40) and (70, -60).
-        let low = vec![[10.0, -2.0], [30.0, -4.0]];
-        let high = vec![[50.0, -40.0], [70.0, -60.0]];
-        let table =
-            Missions((0..11).map(|i| if i < 6 { low.clone() } else { high.clone() }).collect()).table();
-        assert_eq!((table.coverage(), table.least_energy(), table.least_energy_std()), (60.0, 3.0, 1.0));
-        assert_eq!((table.rows[10].data_std, table.rows[10].energy), (10.0, 50.0));
-        // Mean points (20, -3) and (60, -50) above (-1, -200).
-        assert!((table.hypervolume - (61.0 * 150.0 + 21.0 * 47.0)).abs() < 1e-3, "{}", table.hypervolume);
-        let of_each = [51.0 * 160.0 + 11.0 * 38.0, 71.0 * 140.0 + 31.0 * 56.0];
-        assert!((table.mean_hypervolume - (of_each[0] + of_each[1]) / 2.0).abs() < 1e-3);
-        // Sum of w over the two halves: 1.5 and 4.0; of 1 - w: 4.5 and 1.0.
-        let utility = (1.5 * 20.0 - 4.5 * 3.0 + 4.0 * 60.0 - 1.0 * 50.0) / 11.0;
-        assert!((table.utility - utility).abs() < 1e-4, "{} {utility}", table.utility);
-    }
-}
+mod tests;

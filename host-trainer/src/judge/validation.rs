@@ -1,9 +1,9 @@
 //! The realizations that choose the best parameters of a run.
 
+use crate::env::site::Site;
 use crate::judge::evaluation::{Decider, DeciderError, Network, Table, evaluate};
-use crate::keep::snapshot::Learned;
-use crate::learn::settings::Settings;
 use crate::net::Shape;
+use crate::settings::Settings;
 use gleaner_world::{Realization, ScenarioError, ScenarioKind, Seed, World};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -51,7 +51,7 @@ impl Validation {
     ///
     /// # Errors
     /// The scenario does not fit the city.
-    pub fn draw(world: &World, settings: &Settings) -> Result<Validation, ScenarioError> {
+    pub fn draw(site: &Site, settings: &Settings) -> Result<Validation, ScenarioError> {
         let shares = [settings.share_rd, settings.share_rb];
         let trained = ScenarioKind::ALL.into_iter().zip(shares).filter(|(_, share)| *share > 0.0);
         trained
@@ -63,7 +63,7 @@ impl Validation {
                 };
                 let drawn = numbers.map(|number| {
                     let seed = Seed::evaluation(number);
-                    Ok((seed, Realization::draw(world.city(), &kind.scenario(), seed)?))
+                    Ok((seed, site.realization(&site.scenario(kind), seed)?))
                 });
                 Ok((kind, drawn.collect::<Result<_, ScenarioError>>()?))
             })
@@ -88,20 +88,5 @@ impl Validation {
     /// The network's answer is not a number: the run diverged.
     pub fn judge(&self, world: &Arc<World>, actor: &[f32]) -> Result<Tables, DeciderError> {
         self.tables(world, &mut Network::new(Shape::actor(), actor))
-    }
-
-    /// Judges a policy that could fly, gives it its score and offers it to `best`.
-    ///
-    /// # Errors
-    /// Those of [`Validation::judge`].
-    pub fn examine(
-        &self,
-        world: &Arc<World>,
-        candidate: Learned,
-        best: &mut Option<Learned>,
-    ) -> Result<Tables, DeciderError> {
-        let tables = self.judge(world, &candidate.actor)?;
-        Learned { score: tables.score(), ..candidate }.offer(best);
-        Ok(tables)
     }
 }

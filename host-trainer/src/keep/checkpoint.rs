@@ -1,4 +1,4 @@
-//! A file that survives a kill: written beside the last good one, renamed over it when it is whole.
+//! Checkpoints: binary files with a checksum, replaced atomically.
 
 use crate::keep::whole;
 use serde::Serialize;
@@ -8,15 +8,15 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// First bytes of a checkpoint: name and version of the format.
+/// First bytes of a file: name and version of the format.
 const MAGIC: &[u8; 8] = b"GLNCKPT1";
-/// CRC-32 as in IEEE 802.3, over the payload.
+/// CRC-32 (IEEE 802.3) of the payload.
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// Why a checkpoint cannot be used.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    /// The file system's own reason. The last good checkpoint, if there is one, is untouched.
+    /// The file system. The last good checkpoint, if any, is untouched.
     #[error("{}: {source}", path.display())]
     Io {
         /// Which file.
@@ -30,18 +30,18 @@ pub enum CheckpointError {
         /// Which file.
         path: PathBuf,
     },
-    /// The content is not what was written.
-    #[error("{}: truncated or damaged; delete it and resume from the copy of it that you keep, or start anew", path.display())]
+    /// The checksum does not match.
+    #[error("{}: truncated or damaged; restore a copy of it, or delete it to start again", path.display())]
     Damaged {
         /// Which file.
         path: PathBuf,
     },
 }
 
-/// Writes `value` so that `path` is at every moment either the old checkpoint or the new one.
+/// Writes `value` and replaces the file at `path` atomically.
 ///
 /// # Errors
-/// A full disk, mostly. The old checkpoint is then still there.
+/// The file system, for example a full disk; the old checkpoint is then still there.
 pub fn save<T: Serialize>(path: &Path, value: &T) -> Result<(), CheckpointError> {
     let io = |source| CheckpointError::Io { path: path.to_owned(), source };
     let payload = postcard::to_stdvec(value).map_err(|error| io(io::Error::other(error)))?;
@@ -50,7 +50,7 @@ pub fn save<T: Serialize>(path: &Path, value: &T) -> Result<(), CheckpointError>
     whole::write(path, &bytes).map_err(io)
 }
 
-/// [`save`], with the name of what the value belongs to before it.
+/// As [`save`], with a name before the value.
 ///
 /// # Errors
 /// Those of [`save`].
@@ -58,27 +58,27 @@ pub fn save_named<T: Serialize>(path: &Path, name: &str, value: &T) -> Result<()
     save(path, &(name, value))
 }
 
-/// A checkpoint whose name is known and whose value is not yet.
+/// A checkpoint with its name, before its value is decoded.
 #[derive(Debug)]
 pub struct Named {
     path: PathBuf,
     name: String,
     payload: Vec<u8>,
-    /// Where the value begins in the payload.
+    /// Offset of the value in the payload.
     value_at: usize,
 }
 
 impl Named {
-    /// What the value belongs to.
+    /// The name.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The value.
+    /// Decodes the value.
     ///
     /// # Errors
-    /// It is of another type or version.
+    /// It has another type or version.
     pub fn value<T: DeserializeOwned>(&self) -> Result<T, CheckpointError> {
         match postcard::take_from_bytes(&self.payload[self.value_at..]) {
             Ok((value, [])) => Ok(value),
@@ -87,7 +87,7 @@ impl Named {
     }
 }
 
-/// Reads what [`save_named`] wrote.
+/// Reads a file of [`save_named`].
 ///
 /// # Errors
 /// See [`CheckpointError`].
@@ -99,7 +99,7 @@ pub fn load_named(path: &Path) -> Result<Named, CheckpointError> {
     Ok(Named { path: path.to_owned(), name, payload, value_at })
 }
 
-/// Reads a checkpoint back.
+/// Reads a file of [`save`].
 ///
 /// # Errors
 /// See [`CheckpointError`].
@@ -107,7 +107,7 @@ pub fn load<T: DeserializeOwned>(path: &Path) -> Result<T, CheckpointError> {
     postcard::from_bytes(&payload(path)?).map_err(|_| CheckpointError::Format { path: path.to_owned() })
 }
 
-/// The payload of a file that is whole.
+/// The payload of an undamaged file.
 fn payload(path: &Path) -> Result<Vec<u8>, CheckpointError> {
     let io = |source| CheckpointError::Io { path: path.to_owned(), source };
     let mut bytes = Vec::new();
@@ -127,7 +127,7 @@ mod tests {
     use std::fs;
 
     #[test]
-    fn a_checkpoint_comes_back_and_damage_is_noticed() {
+    fn checkpoints_load_and_damage_is_detected() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
         let value: Vec<f32> = (0..1000).map(|i| i as f32 * 0.25).collect();
@@ -146,24 +146,24 @@ mod tests {
     }
 
     #[test]
-    fn a_named_checkpoint_tells_its_name_first_and_leaves_nothing_over() {
+    fn named_checkpoints_must_be_decoded_completely() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
         save_named(&path, "mosac-cgl", &(7u32, 0.5f32)).unwrap();
         let named = load_named(&path).unwrap();
         assert_eq!(named.name(), "mosac-cgl");
         assert_eq!(named.value::<(u32, f32)>().unwrap(), (7, 0.5));
-        assert!(matches!(named.value::<u32>(), Err(CheckpointError::Format { .. })), "four bytes left over");
+        assert!(matches!(named.value::<u32>(), Err(CheckpointError::Format { .. })), "four bytes are left");
         save(&path, &u64::MAX).unwrap();
         assert!(matches!(load_named(&path), Err(CheckpointError::Format { .. })));
     }
 
     #[test]
-    fn a_write_that_fails_leaves_the_old_checkpoint() {
+    fn failed_write_keeps_the_old_checkpoint() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
         save(&path, &1u32).unwrap();
-        // A folder in the way of the temporary file stands for a disk that cannot be written.
+        // A folder at the path of the temporary file makes the write fail.
         fs::create_dir(path.with_extension("writing")).unwrap();
         assert!(matches!(save(&path, &2u32), Err(CheckpointError::Io { .. })));
         assert_eq!(load::<u32>(&path).unwrap(), 1);

@@ -1,12 +1,11 @@
-//! Learning curves on the disk while a run learns: JSON lines for scripts and for the report, TensorBoard events for
-//! people.
+//! Learning curves, written during the training: JSON lines for scripts and the report, and TensorBoard events.
 //!
-//! `curve.jsonl` is the truth: one object a line, `update`, `unix_s` and the numbers by name. The event file beside it
-//! is written anew from it whenever a run is opened, so that a run that goes on from an older checkpoint tells
-//! nothing twice.
+//! `curve.jsonl` is the primary file: one object per line with `update`, `unix_s` and named numbers. The event file
+//! beside it is written again from it whenever a run is opened, so that a run that continues from an older checkpoint
+//! has no point twice.
 
+use crate::judge::validation::Tables;
 use crate::keep::whole;
-use crate::learn::run::{CURVE, Tables};
 use prost::Message;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -16,15 +15,17 @@ use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 use thiserror::Error;
 
-/// The event file's name inside the run's folder: TensorBoard looks for `tfevents`.
+/// File name of the learning curve inside the output folder: one JSON object per line.
+pub const CURVE: &str = "curve.jsonl";
+/// File name of the event file; TensorBoard looks for `tfevents`.
 pub const EVENTS: &str = "events.out.tfevents.gleaner";
-/// CRC-32C, as the record format of the events asks for.
+/// CRC-32C, as TensorBoard's record format requires.
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI);
 
-/// Why a curve cannot be kept or read.
+/// Why a curve cannot be written or read.
 #[derive(Debug, Error)]
 pub enum CurvesError {
-    /// The file system's own reason.
+    /// The file system.
     #[error("{}: {source}", path.display())]
     Io {
         /// Which file.
@@ -32,8 +33,8 @@ pub enum CurvesError {
         /// The reason.
         source: io::Error,
     },
-    /// A line is no point of a curve.
-    #[error("{}: line {line} is no point of a learning curve; move the file away", path.display())]
+    /// A line is not a point of a curve.
+    #[error("{}: line {line} is not a point of a learning curve; move the file away", path.display())]
     Damaged {
         /// Which file.
         path: PathBuf,
@@ -42,12 +43,12 @@ pub enum CurvesError {
     },
 }
 
-/// What a run told at one update.
+/// The numbers of a run at one update.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Updates done.
     pub update: u64,
-    /// When, seconds since 1970; 0 if it was not noted.
+    /// Time, seconds since 1970; 0 if the file has none.
     pub unix_s: f64,
     /// The numbers by name, such as `rd/hypervolume`.
     pub scalars: BTreeMap<String, f64>,
@@ -70,8 +71,8 @@ impl Point {
     }
 }
 
-/// The numbers in an object by their names: its own, those of the objects in it such as the losses, and the metrics of
-/// its validation `tables`. `None` if it is no object or its tables are none.
+/// The named numbers in an object: its own, those of nested objects such as the losses, and the metrics of the validation
+/// `tables`. `None` if the value is not an object or its tables cannot be read.
 #[must_use]
 pub fn scalars_in(value: &Value) -> Option<Vec<(String, f64)>> {
     let mut scalars = Vec::new();
@@ -88,7 +89,7 @@ pub fn scalars_in(value: &Value) -> Option<Vec<(String, f64)>> {
     Some(scalars)
 }
 
-/// The numbers of a validation, by scenario.
+/// The metrics of a validation, by scenario.
 #[must_use]
 pub fn scalars_of(tables: &Tables) -> Vec<(String, f64)> {
     let of_one = |(scenario, table): &(String, crate::judge::evaluation::Table)| {
@@ -103,7 +104,7 @@ pub fn scalars_of(tables: &Tables) -> Vec<(String, f64)> {
     tables.0.iter().flat_map(of_one).collect()
 }
 
-/// The curve of a run that is learning.
+/// The open curve of a run.
 #[derive(Debug)]
 pub struct Curves {
     folder: PathBuf,
@@ -112,19 +113,19 @@ pub struct Curves {
 }
 
 impl Curves {
-    /// Goes on with the curve in `folder`. Points beyond `update`, told before the kill that lost them, are dropped.
+    /// Continues the curve in `folder`. Points beyond `update`, which the run lost when it was killed, are dropped.
     ///
     /// # Errors
     /// See [`CurvesError`]; the old curve is then still there.
     pub fn open(folder: &Path, update: u64) -> Result<Curves, CurvesError> {
-        let mut told = told(folder)?;
-        told.retain(|(_, point)| point.update <= update);
+        let mut points = points(folder)?;
+        points.retain(|(_, point)| point.update <= update);
         let lines = folder.join(CURVE);
-        let text: String = told.iter().map(|(line, _)| format!("{line}\n")).collect();
+        let text: String = points.iter().map(|(line, _)| format!("{line}\n")).collect();
         replace(&lines, text.as_bytes())?;
         let events = folder.join(EVENTS);
         let mut bytes = Vec::new();
-        for event in [Event::first()].into_iter().chain(told.iter().map(|(_, point)| Event::of(point))) {
+        for event in [Event::first()].into_iter().chain(points.iter().map(|(_, point)| Event::of(point))) {
             record(&event, &mut bytes).expect("writing to memory cannot fail");
         }
         replace(&events, &bytes)?;
@@ -132,7 +133,7 @@ impl Curves {
         Ok(Curves { folder: folder.to_owned(), lines: append(&lines)?, events: append(&events)? })
     }
 
-    /// Adds a point. Numbers that are not finite are left out.
+    /// Appends a point without its non-finite numbers.
     ///
     /// # Errors
     /// The disk.
@@ -143,7 +144,7 @@ impl Curves {
             unix_s: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64()),
             scalars: finite.map(|(name, value)| (name.as_ref().to_owned(), *value)).collect(),
         };
-        // In one piece each, so that a kill cuts at most the last line.
+        // One write each, so that a kill damages at most the last line.
         self.lines
             .write_all((point.line() + "\n").as_bytes())
             .map_err(|error| io_error(&self.folder.join(CURVE), error))?;
@@ -153,17 +154,16 @@ impl Curves {
     }
 }
 
-/// The curve in `folder`, in the order in which it was told; empty when there is none. A last line that was cut by a
-/// kill is left out.
+/// The curve in `folder`; empty if there is none. An incomplete last line is left out.
 ///
 /// # Errors
 /// See [`CurvesError`].
 pub fn read(folder: &Path) -> Result<Vec<Point>, CurvesError> {
-    Ok(told(folder)?.into_iter().map(|(_, point)| point).collect())
+    Ok(points(folder)?.into_iter().map(|(_, point)| point).collect())
 }
 
-/// The lines as they stand, and what they say.
-fn told(folder: &Path) -> Result<Vec<(String, Point)>, CurvesError> {
+/// The lines of the file with their points.
+fn points(folder: &Path) -> Result<Vec<(String, Point)>, CurvesError> {
     let path = folder.join(CURVE);
     let text = match fs::read_to_string(&path) {
         Ok(text) => text,
@@ -248,7 +248,7 @@ impl Event {
 mod tests {
     use super::*;
 
-    /// Reads an event file back by the format's rules, not by the writer's code.
+    /// Reads an event file by the rules of the format, without the code of the writer.
     fn events(path: &Path) -> Vec<Event> {
         let bytes = fs::read(path).unwrap();
         let (mut rest, mut events) = (&bytes[..], Vec::new());
@@ -268,27 +268,27 @@ mod tests {
     }
 
     #[test]
-    fn a_resumed_run_tells_nothing_twice() {
+    fn resumed_curve_has_no_point_twice() {
         let folder = tempfile::tempdir().unwrap();
         let mut curves = Curves::open(folder.path(), 0).unwrap();
         for update in [100, 200, 300] {
-            let told = [("rd/hypervolume", update as f64 + 0.5), ("critic", f64::NAN)];
-            curves.log(update, &told).unwrap();
+            let numbers = [("rd/hypervolume", update as f64 + 0.5), ("critic", f64::NAN)];
+            curves.log(update, &numbers).unwrap();
         }
         drop(curves);
-        // The kill cut the line that it was writing; the last checkpoint was at 200.
+        // The last line is incomplete, and the last checkpoint was at 200.
         let path = folder.path().join(CURVE);
         fs::write(&path, fs::read_to_string(&path).unwrap() + "{\"update\":40").unwrap();
         let mut curves = Curves::open(folder.path(), 200).unwrap();
         curves.log(300, &[("rd/hypervolume", 7.0)]).unwrap();
 
         let points = read(folder.path()).unwrap();
-        let told: Vec<_> = points.iter().map(|p| (p.update, p.scalars["rd/hypervolume"])).collect();
-        assert_eq!(told, [(100, 100.5), (200, 200.5), (300, 7.0)]);
+        let logged: Vec<_> = points.iter().map(|p| (p.update, p.scalars["rd/hypervolume"])).collect();
+        assert_eq!(logged, [(100, 100.5), (200, 200.5), (300, 7.0)]);
         assert!(points[0].unix_s > 1.6e9 && points[0].scalars.len() == 1);
         let events = events(&folder.path().join(EVENTS));
         assert_eq!(events[0].file_version.as_deref(), Some("brain.Event:2"));
-        let told: Vec<_> = events[1..]
+        let logged: Vec<_> = events[1..]
             .iter()
             .map(|event| {
                 let value = &event.summary.as_ref().unwrap().value;
@@ -296,11 +296,11 @@ mod tests {
             })
             .collect();
         let name = "rd/hypervolume";
-        assert_eq!(told, [(100, 1, name, 100.5), (200, 1, name, 200.5), (300, 1, name, 7.0)]);
+        assert_eq!(logged, [(100, 1, name, 100.5), (200, 1, name, 200.5), (300, 1, name, 7.0)]);
     }
 
     #[test]
-    fn nested_lines_are_read_and_damage_is_named() {
+    fn nested_lines_are_read_and_damage_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let row = r#"{"w_data":1.0,"data_percent":47.5,"energy":80.0,"energy_std":0.0}"#;
         let line = format!(

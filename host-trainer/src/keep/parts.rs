@@ -1,7 +1,7 @@
-//! Finished parts of a long measurement, kept in a folder so that a kill costs at most one of them.
+//! Finished parts of a long measurement, kept in a folder so that an interrupted measurement continues.
 //!
-//! A part is named by what it was measured from: the model's hash, the setting, the number of realizations. When any of
-//! it changes, the name changes, and the old part is not found.
+//! The name of a part is a hash of its inputs: the model, the setting, the number of realizations. When an input changes,
+//! the name changes and the part is measured again.
 
 use crate::keep::checkpoint::{self, CheckpointError};
 use serde::Serialize;
@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Raised when the same inputs may give other numbers than before, so that old parts are measured anew.
+/// Increment when equal inputs may give other numbers than before, so that old parts are measured again.
 const GENERATION: u32 = 1;
 
 /// The folder of the parts.
@@ -19,32 +19,32 @@ pub struct Parts {
     folder: PathBuf,
 }
 
-/// What became of a part.
+/// Where a part came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// It was there.
+    /// The folder.
     Kept,
-    /// It was not there.
+    /// A new measurement.
     Measured,
-    /// It was there and could not be read, so it was measured again.
+    /// A new measurement, since the file was damaged.
     Repaired,
 }
 
 impl Parts {
-    /// Makes the folder if there is none.
+    /// Opens the folder; makes it if it does not exist.
     ///
     /// # Errors
-    /// The disk.
+    /// The file system.
     pub fn open(folder: &Path) -> Result<Parts, CheckpointError> {
         fs::create_dir_all(folder)
             .map_err(|source| CheckpointError::Io { path: folder.to_owned(), source })?;
         Ok(Parts { folder: folder.to_owned() })
     }
 
-    /// The part that was measured from `facts`, or what `measure` gives, kept for the next time.
+    /// The part with these inputs: from the folder, or from `measure` and then kept.
     ///
     /// # Errors
-    /// Those of `measure`, and the disk.
+    /// Those of `measure`, and the file system.
     pub fn part<T: Serialize + DeserializeOwned, E: From<CheckpointError>>(
         &self,
         facts: &str,
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_is_measured_once_and_damage_is_repaired() {
+    fn parts_are_measured_once_and_repaired() {
         let folder = tempfile::tempdir().unwrap();
         let parts = Parts::open(&folder.path().join("parts")).unwrap();
         assert_eq!(measured(&parts, "model a, rd", 1), (1, Source::Measured));

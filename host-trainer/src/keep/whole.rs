@@ -1,19 +1,19 @@
-//! Files that are whole at every moment.
+//! Atomic replacement of files.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Writes the file so that `path` is at every moment either what it was or the new one, also after a power cut.
+/// Replaces the file at `path` atomically, also across a power cut: it has either the old content or the new one.
 ///
 /// # Errors
-/// A full disk, mostly. What was there is then still there.
+/// The file system, for example a full disk; the old content is then still there.
 pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let temporary = path.with_extension("writing");
     let write = || -> io::Result<()> {
         let mut file = File::create(&temporary)?;
         file.write_all(bytes)?;
-        // On the disk before the name points to it.
+        // The content must be on the disk before the name refers to it.
         file.sync_all()?;
         fs::rename(&temporary, path)
     };

@@ -1,41 +1,43 @@
 //! Double deep Q-network (van Hasselt, Guez and Silver 2016) with vector values: the paper's DDQN-CGL.
 //!
-//! The paper takes the network of Theile et al. and concatenates the preference; its value functions are vectors
+//! The paper takes the network of Theile et al. and concatenates the preference. Its value functions are vectors
 //! conditioned on the preference (section IV-A, after Abels et al. 2019), and all its algorithms share learning rate,
-//! batch, replay and J = 3 preferences a transition (section V-B). So here: one network of values `Q(s, a, w)` for
-//! both objectives, the online network choosing the next action by `w . Q`, the slow one judging it, and the same
-//! squared error per objective as the critics of MOSAC (eq. 16). Actions that the guard forbids are neither taken nor
-//! chosen in targets. The paper says nothing of exploration: here epsilon-greedy, falling over the same updates as
-//! MOSAC's heat.
+//! batch, replay and J = 3 preferences per transition (section V-B). Accordingly, one network estimates `Q(s, a, w)`
+//! for both objectives; the online network selects the next action by `w . Q` and the target network evaluates it; the
+//! loss is the squared error per objective, as for the critics of MOSAC (eq. 16). Actions that the guard forbids are
+//! neither taken nor selected in targets. The paper does not describe the exploration. Here it is epsilon-greedy, and
+//! epsilon falls over the same environment steps as the temperature of MOSAC.
 
-use crate::learn::learner::{
-    self, ACTIONS, OBJECTIVES, Remembered, Scratch, Trained, VALUES, scalarise, seen_reward,
+use crate::env::distribution::{ACTIONS, Distribution};
+use crate::learn::algorithm::{
+    Algorithm, OBJECTIVES, Scratch, TrainedNetwork, TransitionOf, VALUES, bootstrap_discount,
+    learning_reward, scalarise,
 };
-use crate::learn::mosac::Distribution;
-use crate::learn::settings::{Settings, mix};
 use crate::net::{self, Architecture};
-use crate::observe::encoding::Encoding;
-use crate::systems::System;
+use crate::observe::Encoding;
+use crate::settings::{Settings, interpolate};
 use gleaner_policy::Preference;
 use gleaner_units::{Action, ActionMask};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Share of random actions at the start and after the annealing.
-const EPSILON: (f32, f32) = (1.0, 0.05);
+/// Share of random actions at the start of the annealing (uniform exploration, as in most implementations).
+const EPSILON_START: f32 = 1.0;
+/// Share of random actions after the annealing.
+const EPSILON_END: f32 = 0.05;
 
-/// The networks and what is needed to go on learning.
+/// The networks and the state of the optimiser.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct Learner<E: Encoding> {
-    values: Trained,
-    slow: Vec<f32>,
+pub struct Ddqn<E: Encoding> {
+    online: TrainedNetwork,
+    target: Vec<f32>,
     #[serde(skip)]
     scratch: Scratch<E>,
 }
 
-/// What an update saw: means over the batch.
+/// Means over the batch of one update.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Losses {
     /// Half the squared error.
@@ -50,22 +52,22 @@ impl fmt::Display for Losses {
     }
 }
 
-impl<E: Encoding> learner::Learner for Learner<E> {
+impl<E: Encoding> Algorithm for Ddqn<E> {
     type Encoding = E;
     type Losses = Losses;
-    const SYSTEM: System = System::DdqnCgl;
+    const NAME: &'static str = E::DDQN_NAME;
 
-    fn new(_: &Settings, rng: &mut ChaCha8Rng) -> Learner<E> {
-        let values = Trained::new(&Self::network(), rng);
-        Learner { slow: values.parameters.clone(), values, scratch: Scratch::default() }
+    fn new(_: &Settings, rng: &mut ChaCha8Rng) -> Ddqn<E> {
+        let online = TrainedNetwork::new(&Self::network(), rng);
+        Ddqn { target: online.parameters.clone(), online, scratch: Scratch::default() }
     }
 
     fn network() -> E::Network {
         E::network(VALUES)
     }
 
-    fn deciding(&self) -> &[f32] {
-        &self.values.parameters
+    fn policy_parameters(&self) -> &[f32] {
+        &self.online.parameters
     }
 
     fn update(
@@ -73,17 +75,17 @@ impl<E: Encoding> learner::Learner for Learner<E> {
         encoding: &E,
         settings: &Settings,
         update: u64,
-        transitions: &[&Remembered<E>],
+        transitions: &[&TransitionOf<E>],
         preferences: &[Preference],
     ) -> Losses {
         self.scratch.pack(encoding, transitions, preferences);
         let targets = self.targets(settings, transitions, preferences);
         let scale = 1.0 / preferences.len() as f32;
         let mut value = 0.0;
-        self.values.zero_gradients();
+        self.online.zero_gradients();
         let Scratch { before, workspace, .. } = &mut self.scratch;
         Self::network().forward_backward(
-            &self.values.parameters,
+            &self.online.parameters,
             before,
             workspace,
             |range, outputs, gradients| {
@@ -98,10 +100,10 @@ impl<E: Encoding> learner::Learner for Learner<E> {
                     }
                 }
             },
-            &mut self.values.gradients,
+            &mut self.online.gradients,
         );
-        self.values.descend(settings.learning_rate_at(update));
-        net::polyak(&mut self.slow, &self.values.parameters, settings.polyak);
+        self.online.descend(settings.learning_rate_at(update));
+        net::polyak(&mut self.target, &self.online.parameters, settings.polyak);
         Losses { value, epsilon: epsilon(settings, update) }
     }
 
@@ -115,34 +117,35 @@ impl<E: Encoding> learner::Learner for Learner<E> {
 }
 
 fn epsilon(settings: &Settings, update: u64) -> f32 {
-    mix(EPSILON.0, EPSILON.1, settings.annealed(update))
+    interpolate(EPSILON_START, EPSILON_END, settings.annealed(update))
 }
 
-impl<E: Encoding> Learner<E> {
-    /// y = r + gamma Q_slow(s', argmax_a w . Q(s', a, w), w), per objective.
+impl<E: Encoding> Ddqn<E> {
+    /// y = r + gamma^n Q_target(s', argmax_a w . Q(s', a, w), w), per objective.
     fn targets(
         &mut self,
         settings: &Settings,
-        transitions: &[&Remembered<E>],
+        transitions: &[&TransitionOf<E>],
         preferences: &[Preference],
     ) -> Vec<[f32; OBJECTIVES]> {
-        let network = <Self as learner::Learner>::network();
+        let network = <Self as Algorithm>::network();
+        let discount = bootstrap_discount(settings);
         let Scratch { after, workspace, .. } = &mut self.scratch;
-        let own: Vec<[f32; VALUES]> =
-            network.forward(&self.values.parameters, after, workspace).as_chunks().0.to_vec();
-        let slow = network.forward(&self.slow, after, workspace).as_chunks::<VALUES>().0;
-        let samples = preferences.iter().zip(own.iter().zip(slow)).enumerate();
+        let online: Vec<[f32; VALUES]> =
+            network.forward(&self.online.parameters, after, workspace).as_chunks().0.to_vec();
+        let target = network.forward(&self.target, after, workspace).as_chunks::<VALUES>().0;
+        let samples = preferences.iter().zip(online.iter().zip(target)).enumerate();
         samples
-            .map(|(index, (&preference, (own, slow)))| {
+            .map(|(index, (&preference, (online, target)))| {
                 let transition = transitions[index / settings.preferences];
-                let mut target = seen_reward::<E>(settings, transition);
-                let next = transition.mask_after.argmax(&scalarise(own, preference));
+                let mut returns = learning_reward::<E>(settings, transition);
+                let next = transition.mask_after.argmax(&scalarise(online, preference));
                 if let Some(next) = next.filter(|_| !transition.over) {
-                    for (objective, target) in target.iter_mut().enumerate() {
-                        *target += settings.discount * slow[Action::index(next) * OBJECTIVES + objective];
+                    for (objective, value) in returns.iter_mut().enumerate() {
+                        *value += discount * target[Action::index(next) * OBJECTIVES + objective];
                     }
                 }
-                target
+                returns
             })
             .collect()
     }

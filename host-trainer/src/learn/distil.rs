@@ -1,64 +1,88 @@
-//! Distillation: the actor learns to do what a teacher would do, from what it can see itself.
+//! Distillation: the actor imitates a teacher from its own observations.
 //!
-//! The teacher is a planner that knows everything; or mentors, policies that have been learned already, each asked in
-//! the eight views of the situation. What a network has learned by accident differs from view to view, so the mean
-//! of its answers is better than each, and a pupil that learns the mean keeps what is better (as ensembles do: Hinton,
-//! Vinyals and Dean 2015).
+//! The teacher is a planner with full knowledge, or an ensemble of trained policies (mentors), each evaluated in the
+//! eight views of the state. The errors of a network differ from view to view, so the mean of its logits is better than
+//! each of them, and a student of the mean keeps the gain (ensemble distillation: Hinton, Vinyals and Dean 2015).
 //!
-//! The learner flies and the teacher says at every slot what it would have done (DAgger: Ross, Gordon and Bagnell
-//! 2011), so the learner is taught in the states that it gets itself into. It sees each lesson in a view drawn at
-//! random. The loss is the cross entropy of the teacher's distribution under the masked policy.
+//! The student flies and the teacher labels every state (DAgger: Ross, Gordon and Bagnell 2011), so that the student is
+//! trained on the states that it visits. Each example is shown in a random view. The loss is the cross entropy between
+//! the teacher's distribution and the masked policy.
 
+use crate::env::distribution::{ACTIONS, Distribution};
 use crate::env::flight::Flight;
+use crate::env::site::Site;
 use crate::judge::evaluation::{DeciderError, Network};
-use crate::keep::checkpoint::{self, CheckpointError};
-use crate::learn::learning::{Learning, Pace};
-use crate::learn::mosac::Distribution;
-use crate::learn::run::{Learned, Tables, TrainError, Validation};
-use crate::learn::settings::Settings;
+use crate::judge::validation::{Tables, Validation};
+use crate::keep::checkpoint::CheckpointError;
+use crate::keep::snapshot::{LAST, Snapshot};
+use crate::learn::resume;
+use crate::learn::trainer::{Pace, TrainError, Trainer};
 use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
-use crate::observe::tokens::Observation;
+use crate::observe::Encoding;
+use crate::observe::tokens::{Observation, PolicyTokens};
 use crate::planner::teacher::{Course, Teacher};
-use crate::systems::System;
+use crate::settings::Settings;
 use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
-use gleaner_world::{Realization, ScenarioKind, World};
+use gleaner_world::ScenarioKind;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fmt;
 use std::path::Path;
-use std::sync::Arc;
 
-/// The checkpoint's name inside the output folder.
+/// File name of the checkpoint inside the output folder.
 pub const CHECKPOINT: &str = "distil.checkpoint";
-/// Missions in the air at once.
-const FLIGHTS: usize = 16;
-/// Lessons before the first update.
-const WARM_UP: usize = 2_000;
-/// Updates over which the teacher hands the controls to the learner.
-const HAND_OVER: u64 = 2_000;
-/// Lessons of the shortest mission that are kept, and how often one of them is in a batch.
-const SHORTEST_KEPT: usize = 4_000;
-const SHORTEST_EVERY: usize = 4;
-/// Share of the actor that its running average takes over per update.
-const AVERAGING: f32 = 0.001;
+/// Name in the checkpoint.
+const NAME: &str = "distil";
 
-/// A state and what the teacher would do in it.
+/// Hyper-parameters that the command line does not set. Source of all: trials on the default city.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistilSettings {
+    /// Flights in parallel: 16.
+    pub flights: usize,
+    /// Examples before the first update: 2,000.
+    pub warm_up: usize,
+    /// Updates over which the share of slots that the student flies rises from 0: 2,000.
+    pub hand_over: u64,
+    /// Largest share of the slots that the student flies: 0.9.
+    pub student_share: f64,
+    /// Capacity of the memory of the shortest mission, examples: 4,000.
+    pub shortest_kept: usize,
+    /// One example in so many of a batch is of the shortest mission: 4.
+    pub shortest_every: usize,
+    /// Step size of the running average of the actor, per update: 0.001.
+    pub averaging: f32,
+}
+
+impl DistilSettings {
+    /// The values that trained the shipped policy.
+    pub const DEFAULT: DistilSettings = DistilSettings {
+        flights: 16,
+        warm_up: 2_000,
+        hand_over: 2_000,
+        student_share: 0.9,
+        shortest_kept: 4_000,
+        shortest_every: 4,
+        averaging: 0.001,
+    };
+}
+
+/// A state with the teacher's distribution.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct Lesson {
-    seen: Observation,
+struct Example {
+    state: Observation,
     preference: Preference,
     mask: ActionMask,
     /// Probability of each action.
-    taught: [f32; Action::COUNT],
+    target: [f32; ACTIONS],
 }
 
-/// What an update tells.
+/// The loss of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CrossEntropy {
-    /// Of the teacher's distribution under the masked policy, nats.
+    /// Between the teacher's distribution and the masked policy, nats.
     pub cross_entropy: f32,
 }
 
@@ -72,13 +96,14 @@ impl fmt::Display for CrossEntropy {
 pub struct Distillation {
     method: String,
     settings: Settings,
-    world: Arc<World>,
+    constants: DistilSettings,
+    site: Site,
     teacher: Teacher,
-    /// Those who teach instead of the planner, if there are any.
-    mentors: Vec<Learned>,
+    /// The teachers in place of the planner, if any.
+    mentors: Vec<Snapshot>,
     flights: Vec<(Flight, Course)>,
-    shortest: VecDeque<Lesson>,
-    kept: Kept,
+    shortest: VecDeque<Example>,
+    stored: Stored,
     gradients: Vec<f32>,
     batch: Batch,
     workspace: Workspace,
@@ -86,14 +111,29 @@ pub struct Distillation {
     validation: Validation,
 }
 
-fn not_a_number() -> DeciderError {
-    DeciderError("a mentor's answer is not a number".into())
+/// The checkpoint after the settings; the field order is the file format. The current flights and the examples of the
+/// shortest mission are not in it: they start anew.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    actor: Vec<f32>,
+    averaged: Vec<f32>,
+    adam: Adam,
+    examples: Vec<Example>,
+    next_example: usize,
+    next_mission: u64,
+    update: u64,
+    steps: u64,
+    rng_word: u128,
 }
 
-/// The command line that comes here, from the first one on.
-fn method(from: Option<&Learned>, mentors: &[Learned]) -> String {
-    let whole = |learned: &Learned, out: &str| {
-        learned.settings.command_line(&learned.method, out).trim_start_matches("gleaner-train ").to_owned()
+fn not_a_number() -> DeciderError {
+    DeciderError("a mentor's output is not a number".into())
+}
+
+/// The chain of commands that ends with this run, without its settings.
+fn method(from: Option<&Snapshot>, mentors: &[Snapshot]) -> String {
+    let whole = |snapshot: &Snapshot, out: &str| {
+        snapshot.command_line(out).trim_start_matches("gleaner-train ").to_owned()
     };
     let mut method = from.map_or("distil".to_owned(), |from| {
         format!("{} && gleaner-train distil --from FIRST", whole(from, "FIRST"))
@@ -109,254 +149,251 @@ fn method(from: Option<&Learned>, mentors: &[Learned]) -> String {
     method
 }
 
-/// What the checkpoint keeps. Flights in the air, and the lessons of the shortest mission, begin anew after a kill.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    settings: Settings,
-    actor: Vec<f32>,
-    averaged: Vec<f32>,
-    adam: Adam,
-    lessons: Vec<Lesson>,
-    next_lesson: usize,
-    next_mission: u64,
-    update: u64,
-    steps: u64,
-    rng_word: u128,
-}
-
 impl Distillation {
-    /// Goes on from the checkpoint in `folder`, or starts anew, with the actor of `from` if there is one. Mentors take
-    /// the place of the planner.
+    /// Continues from the checkpoint in `folder`, or starts with the actor of `from` if given. Mentors replace the
+    /// planner as the teacher.
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
     pub fn open(
         settings: Settings,
+        site: Site,
         folder: &Path,
-        from: Option<&Learned>,
-        mentors: Vec<Learned>,
+        from: Option<&Snapshot>,
+        mentors: Vec<Snapshot>,
     ) -> Result<Distillation, TrainError> {
-        let path = folder.join(CHECKPOINT);
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-        let kept = if path.exists() {
-            let mut kept: Kept = checkpoint::load(&path)?;
-            // A finished run may be prolonged.
-            kept.settings.updates = settings.updates;
-            if kept.settings != settings {
-                return Err(TrainError::OtherSettings { path });
+        let stored = match resume::load::<Stored>(&folder.join(CHECKPOINT), NAME, &settings)? {
+            Some(stored) => {
+                rng.set_word_pos(stored.rng_word);
+                stored
             }
-            rng.set_word_pos(kept.rng_word);
-            kept
-        } else {
-            let fresh = Shape::actor().initialise(&mut rng);
-            let actor = from.map_or(fresh, |learned| learned.actor.clone());
-            Kept {
-                averaged: actor.clone(),
-                adam: Adam::new(actor.len(), 0.0),
-                actor,
-                lessons: Vec::new(),
-                next_lesson: 0,
-                next_mission: 0,
-                update: 0,
-                steps: from.map_or(0, |learned| learned.steps),
-                rng_word: 0,
-                settings: settings.clone(),
-            }
+            None => Stored::start(from, &mut rng),
         };
-        let world = Arc::new(World::default_world());
         let mut run = Distillation {
-            teacher: Teacher::new(Arc::clone(&world)),
-            validation: Validation::draw(&world, &settings)?,
+            teacher: Teacher::new(site.world().clone()),
+            validation: Validation::draw(&site, &settings)?,
             method: method(from, &mentors),
+            constants: DistilSettings::DEFAULT,
             mentors,
             settings,
-            world,
+            site,
             flights: Vec::new(),
             shortest: VecDeque::new(),
-            kept,
+            stored,
             gradients: Vec::new(),
             batch: Batch::new(),
             workspace: Workspace::new(),
             rng,
         };
-        for index in 0..FLIGHTS {
+        for index in 0..run.constants.flights {
             let flight = run.next_flight(index)?;
             run.flights.push(flight);
         }
         Ok(run)
     }
 
-    /// The first of the flights is always out and back for energy alone. It lasts two slots, so among the lessons of
-    /// drawn missions it would hardly be seen, and it must be flown exactly: its lessons are kept apart.
+    /// Flight 0 is always the mission out and back for energy alone. It lasts two slots, so the examples of drawn
+    /// missions would hardly contain it, and it must be flown without an error.
     fn next_flight(&mut self, index: usize) -> Result<(Flight, Course), TrainError> {
-        let mut mission = self.settings.mission(&self.world, self.kept.next_mission)?;
-        self.kept.next_mission += 1;
+        let mut mission = self.settings.missions().mission(&self.site, self.stored.next_mission)?;
+        self.stored.next_mission += 1;
         if index == 0 && self.settings.share_rb > 0.0 {
-            let scenario = ScenarioKind::ReturnBase.scenario();
-            mission.realization = Realization::draw(self.world.city(), &scenario, mission.seed)?;
+            let scenario = self.site.scenario(ScenarioKind::ReturnBase);
+            mission.realization = self.site.realization(&scenario, mission.seed)?;
             mission.preference = Preference::ENERGY;
         }
-        let flight = Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)?;
+        let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?;
         Ok((flight, self.teacher.study(&mission.realization)))
     }
 
-    /// Every flight is shown to the teacher; the learner, or at first the teacher, decides.
-    fn fly(&mut self) -> Result<(), TrainError> {
-        let seen: Vec<Observation> = self.flights.iter().map(|(flight, _)| flight.observe()).collect();
-        let inputs = self.flights.iter().zip(&seen).map(|((flight, _), seen)| seen.with(flight.preference()));
-        let inputs: Vec<Sample> = inputs.collect();
-        let logits = Network::new(Shape::actor(), &self.kept.actor).logits(inputs.iter().copied());
-        let mentored = self.mentored(&inputs);
-        let learner_flies = (self.kept.update as f64 / HAND_OVER as f64).min(0.9);
-        for (index, (seen, logits)) in seen.into_iter().zip(logits).enumerate() {
-            let (flight, known) = &mut self.flights[index];
+    /// One slot of every flight: the teacher labels the state; the student, or at first the teacher, flies.
+    fn collect(&mut self) -> Result<(), TrainError> {
+        let states: Vec<Observation> =
+            self.flights.iter().map(|(flight, _)| Observation::new(&flight.tokens())).collect();
+        let inputs: Vec<Sample> = (self.flights.iter().zip(&states))
+            .map(|((flight, _), state)| state.with(flight.preference()))
+            .collect();
+        let logits = Network::new(Shape::actor(), &self.stored.actor).logits(inputs.iter().copied());
+        let mentors = self.mentor_logits(&inputs);
+        let progress = self.stored.update as f64 / self.constants.hand_over as f64;
+        let student_share = progress.min(self.constants.student_share);
+        for (index, (state, logits)) in states.into_iter().zip(logits).enumerate() {
+            let (flight, course) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
-            let (advice, taught) = match mentored.get(index) {
-                None => known.teach(flight),
+            let (advice, target) = match mentors.get(index) {
+                None => course.teach(flight),
                 Some(logits) => {
                     let advice = mask.argmax(logits).ok_or_else(not_a_number)?;
                     (advice, Distribution::new(logits, mask).probability)
                 }
             };
-            // As on board: the states to be taught in are those that the finished policy will see.
+            // The student acts as on board, so that the states are those of the finished policy.
             let own = mask.argmax(&logits).unwrap_or(advice);
-            let action = if self.rng.random_bool(learner_flies) { own } else { advice };
+            let action = if self.rng.random_bool(student_share) { own } else { advice };
             flight.step(action);
-            self.kept.steps += 1;
-            let lesson = Lesson { seen, preference, mask, taught };
-            if index == 0 {
-                self.shortest.truncate(SHORTEST_KEPT - 1);
-                self.shortest.push_front(lesson.clone());
-            }
-            if self.kept.lessons.len() < self.settings.replay {
-                self.kept.lessons.push(lesson);
-            } else {
-                self.kept.lessons[self.kept.next_lesson] = lesson;
-            }
-            self.kept.next_lesson = (self.kept.next_lesson + 1) % self.settings.replay;
-            if flight.is_over() {
+            let is_over = flight.is_over();
+            self.stored.steps += 1;
+            self.remember(index, Example { state, preference, mask, target });
+            if is_over {
                 self.flights[index] = self.next_flight(index)?;
             }
         }
         Ok(())
     }
 
-    /// The mean logits of all mentors in all views; nothing without mentors.
-    fn mentored(&self, inputs: &[Sample]) -> Vec<[f32; Action::COUNT]> {
-        let answers = self
-            .mentors
-            .iter()
-            .map(|mentor| Network::new(Shape::actor(), &mentor.actor).averaged_logits(inputs));
-        let share = 1.0 / self.mentors.len().max(1) as f32;
-        answers
-            .reduce(|mut sums, answers| {
-                for (sum, answer) in sums.as_flattened_mut().iter_mut().zip(answers.as_flattened()) {
-                    *sum += answer;
-                }
-                sums
-            })
-            .map(|mut sums| {
-                sums.as_flattened_mut().iter_mut().for_each(|logit| *logit *= share);
-                sums
-            })
-            .unwrap_or_default()
+    fn remember(&mut self, flight: usize, example: Example) {
+        if flight == 0 {
+            self.shortest.truncate(self.constants.shortest_kept - 1);
+            self.shortest.push_front(example.clone());
+        }
+        if self.stored.examples.len() < self.settings.replay {
+            self.stored.examples.push(example);
+        } else {
+            self.stored.examples[self.stored.next_example] = example;
+        }
+        self.stored.next_example = (self.stored.next_example + 1) % self.settings.replay;
     }
 
+    /// Mean logits of all mentors in all views; empty without mentors.
+    fn mentor_logits(&self, inputs: &[Sample]) -> Vec<[f32; ACTIONS]> {
+        let Some((first, others)) = self.mentors.split_first() else { return Vec::new() };
+        let logits = |mentor: &Snapshot| Network::new(Shape::actor(), &mentor.actor).averaged_logits(inputs);
+        let mut mean = logits(first);
+        for mentor in others {
+            for (sum, logit) in mean.as_flattened_mut().iter_mut().zip(logits(mentor).as_flattened()) {
+                *sum += logit;
+            }
+        }
+        let share = 1.0 / self.mentors.len() as f32;
+        mean.as_flattened_mut().iter_mut().for_each(|logit| *logit *= share);
+        mean
+    }
+
+    /// One gradient step; returns the cross entropy.
     fn learn(&mut self) -> f32 {
         let count = self.settings.batch * self.settings.preferences;
-        let lessons: Vec<&Lesson> = (0..count)
+        let examples: Vec<&Example> = (0..count)
             .map(|index| {
-                if index % SHORTEST_EVERY == 0 {
+                if index % self.constants.shortest_every == 0 {
                     &self.shortest[self.rng.random_range(0..self.shortest.len())]
                 } else {
-                    &self.kept.lessons[self.rng.random_range(0..self.kept.lessons.len())]
+                    &self.stored.examples[self.rng.random_range(0..self.stored.examples.len())]
                 }
             })
             .collect();
         let views: Vec<View> =
-            lessons.iter().map(|_| View::ALL[self.rng.random_range(0..View::ALL.len())]).collect();
+            examples.iter().map(|_| View::ALL[self.rng.random_range(0..View::ALL.len())]).collect();
         self.batch.clear();
-        for (lesson, &view) in lessons.iter().zip(&views) {
-            self.batch.push_sample(&lesson.seen.with(lesson.preference).seen(view));
+        for (example, &view) in examples.iter().zip(&views) {
+            self.batch.push_sample(&example.state.with(example.preference).seen(view));
         }
         self.gradients.clear();
-        self.gradients.resize(self.kept.actor.len(), 0.0);
+        self.gradients.resize(self.stored.actor.len(), 0.0);
         let scale = 1.0 / count as f32;
         let mut loss = 0.0;
         net::forward_backward(
             &Shape::actor(),
-            &self.kept.actor,
+            &self.stored.actor,
             &self.batch,
             &mut self.workspace,
             |range, outputs, gradients| {
-                let rows = outputs.as_chunks::<5>().0.iter().zip(gradients.as_chunks_mut::<5>().0);
-                let seen = lessons[range.clone()].iter().zip(&views[range]);
-                for ((logits, gradients), (lesson, view)) in rows.zip(seen) {
-                    let plain = Action::ALL.map(|action| logits[view.action(action).index()]);
-                    let policy = Distribution::new(&plain, lesson.mask);
+                let rows =
+                    outputs.as_chunks::<ACTIONS>().0.iter().zip(gradients.as_chunks_mut::<ACTIONS>().0);
+                let labelled = examples[range.clone()].iter().zip(&views[range]);
+                for ((logits, gradients), (example, view)) in rows.zip(labelled) {
+                    let unturned = Action::ALL.map(|action| logits[view.action(action).index()]);
+                    let policy = Distribution::new(&unturned, example.mask);
                     for action in Action::ALL {
-                        let (index, taught) = (action.index(), lesson.taught[action.index()]);
-                        loss -= scale * taught * policy.log_probability[index];
-                        gradients[view.action(action).index()] = scale * (policy.probability[index] - taught);
+                        let (index, target) = (action.index(), example.target[action.index()]);
+                        loss -= scale * target * policy.log_probability[index];
+                        gradients[view.action(action).index()] = scale * (policy.probability[index] - target);
                     }
                 }
             },
             &mut self.gradients,
         );
-        self.kept.adam.lr = self.settings.learning_rate_at(self.kept.update);
-        self.kept.adam.step(&mut self.kept.actor, &self.gradients);
+        self.stored.adam.lr = self.settings.learning_rate_at(self.stored.update);
+        self.stored.adam.step(&mut self.stored.actor, &self.gradients);
         loss
+    }
+
+    /// The averaged policy as it is now.
+    fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            system: PolicyTokens::MOSAC_NAME.to_owned(),
+            method: self.method.clone(),
+            settings: self.settings.clone(),
+            actor: self.stored.averaged.clone(),
+            update: self.stored.update,
+            steps: self.stored.steps,
+            score: f64::NEG_INFINITY,
+        }
     }
 }
 
-impl Learning for Distillation {
+impl Stored {
+    fn start(from: Option<&Snapshot>, rng: &mut ChaCha8Rng) -> Stored {
+        let initial = Shape::actor().initialise(rng);
+        let actor = from.map_or(initial, |snapshot| snapshot.actor.clone());
+        Stored {
+            averaged: actor.clone(),
+            adam: Adam::new(actor.len(), 0.0),
+            actor,
+            examples: Vec::new(),
+            next_example: 0,
+            next_mission: 0,
+            update: 0,
+            steps: from.map_or(0, |snapshot| snapshot.steps),
+            rng_word: 0,
+        }
+    }
+}
+
+impl Trainer for Distillation {
     type Losses = CrossEntropy;
-    const PACE: Pace = Pace::QUICK;
+    const PACE: Pace = Pace::FAST;
 
     fn settings(&self) -> &Settings {
         &self.settings
     }
 
     fn update(&self) -> u64 {
-        self.kept.update
+        self.stored.update
     }
 
     fn steps(&self) -> u64 {
-        self.kept.steps
+        self.stored.steps
     }
 
-    /// Flies one slot of every flight if lessons are due.
+    /// Collects examples when they are due, in rounds of all flights, and makes one update.
     fn advance(&mut self) -> Result<CrossEntropy, TrainError> {
-        while self.kept.lessons.len() < WARM_UP || self.shortest.is_empty() {
-            self.fly()?;
+        while self.stored.examples.len() < self.constants.warm_up.min(self.settings.replay)
+            || self.shortest.is_empty()
+        {
+            self.collect()?;
         }
-        // As many slots per update as the settings say, in rounds of all flights.
-        let every = (FLIGHTS / self.settings.steps_per_update).max(1);
-        if self.kept.update.is_multiple_of(every as u64) {
-            self.fly()?;
+        let every = (self.constants.flights / self.settings.steps_per_update).max(1);
+        if self.stored.update.is_multiple_of(every as u64) {
+            self.collect()?;
         }
         let cross_entropy = self.learn();
-        self.kept.update += 1;
-        let share = AVERAGING.max(1.0 / self.kept.update as f32);
-        net::polyak(&mut self.kept.averaged, &self.kept.actor, share);
+        self.stored.update += 1;
+        // A plain mean at first, so that the average soon forgets the initial parameters.
+        let share = self.constants.averaging.max(1.0 / self.stored.update as f32);
+        net::polyak(&mut self.stored.averaged, &self.stored.actor, share);
         Ok(CrossEntropy { cross_entropy })
     }
 
-    fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
-        let candidate = Learned {
-            system: System::Gleaner,
-            method: self.method.clone(),
-            settings: self.settings.clone(),
-            actor: self.kept.averaged.clone(),
-            update: self.kept.update,
-            steps: self.kept.steps,
-            score: f64::NEG_INFINITY,
-        };
-        Ok(self.validation.examine(&self.world, candidate, best)?)
+    fn validate(&mut self, best: &mut Option<Snapshot>) -> Result<Tables, TrainError> {
+        let tables = self.validation.judge(self.site.world(), &self.stored.averaged)?;
+        Snapshot { score: tables.score(), ..self.snapshot() }.offer(best);
+        Ok(tables)
     }
 
     fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
-        self.kept.rng_word = self.rng.get_word_pos();
-        checkpoint::save(&folder.join(CHECKPOINT), &self.kept)
+        self.stored.rng_word = self.rng.get_word_pos();
+        resume::save(&folder.join(CHECKPOINT), NAME, &self.settings, &self.stored)?;
+        self.snapshot().save(&folder.join(LAST))
     }
 }

@@ -1,11 +1,16 @@
-//! The learning algorithms and the loop that runs them.
+//! The learning algorithms.
+//!
+//! [`run`] is the off-policy loop of [`mosac`] and [`ddqn`]; [`distil`] imitates a teacher; [`ppo`] refines a policy
+//! from its own flights. All three are a [`trainer::Trainer`].
 
+pub mod algorithm;
 pub mod ddqn;
 pub mod distil;
-pub mod learner;
-pub mod learning;
 pub mod mosac;
+mod n_step;
+pub mod policy;
 pub mod ppo;
 pub mod replay;
+mod resume;
 pub mod run;
-pub mod settings;
+pub mod trainer;

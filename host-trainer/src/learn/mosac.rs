@@ -1,45 +1,46 @@
 //! Multi-objective soft actor-critic for discrete actions (paper, section IV-A).
 //!
-//! One actor and two critics with vector values, all conditioned on the preference; two slowly following target
-//! critics; a learned entropy weight nu. Actions that the guard forbids have probability zero everywhere, so the
-//! learner never spends capacity on what cannot be flown.
+//! One actor and twin critics with vector values, all conditioned on the preference; two target critics; a learned
+//! entropy coefficient nu. Forbidden actions have probability zero in the policy, the targets and the losses.
 
-use crate::learn::learner::{
-    self, ACTIONS, OBJECTIVES, Remembered, Scratch, Trained, VALUES, scalarise, seen_reward,
+use crate::env::distribution::{ACTIONS, Distribution};
+use crate::learn::algorithm::{
+    Algorithm, OBJECTIVES, Scratch, TrainedNetwork, TransitionOf, VALUES, bootstrap_discount,
+    learning_reward, scalarise,
 };
-use crate::learn::settings::Settings;
 use crate::net::{self, Adam, Architecture};
-use crate::observe::encoding::Encoding;
-use crate::systems::System;
+use crate::observe::Encoding;
+use crate::settings::{Settings, TwinMinimum};
 use gleaner_policy::Preference;
-use gleaner_units::{Action, ActionMask};
+use gleaner_units::ActionMask;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The networks and what is needed to go on learning.
+/// The networks and the state of their optimisers.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(bound = "")]
-pub struct Learner<E: Encoding> {
-    actor: Trained,
-    critics: [Trained; 2],
+pub struct Mosac<E: Encoding> {
+    actor: TrainedNetwork,
+    critics: [TrainedNetwork; 2],
     targets: [Vec<f32>; 2],
-    log_entropy_weight: Vec<f32>,
-    adam_entropy: Adam,
+    /// ln nu, as a parameter vector of length 1.
+    log_entropy_coefficient: Vec<f32>,
+    entropy_adam: Adam,
     #[serde(skip)]
     scratch: Scratch<E>,
 }
 
-/// What an update saw: means over the batch.
+/// Means over the batch of one update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Losses {
-    /// Half the squared error of both critics.
+    /// Half the squared error, summed over both critics.
     pub critic: f32,
-    /// The actor's objective.
+    /// Loss of the actor.
     pub actor: f32,
     /// Entropy of the policy, nats.
     pub entropy: f32,
-    /// nu.
+    /// Entropy coefficient nu.
     pub entropy_weight: f32,
 }
 
@@ -50,33 +51,37 @@ impl fmt::Display for Losses {
     }
 }
 
-/// The step-dependent part of the settings.
+/// Hyper-parameters of one update.
 #[derive(Clone, Copy, Debug)]
-struct Rates {
+struct UpdateSettings {
     /// Adam's step size.
     learning_rate: f32,
-    /// Target entropy as a share of the largest possible.
+    /// Target entropy as a share of the entropy of the uniform policy.
     entropy_target: f32,
-    /// Temperature of the policy's softmax inside targets, losses and entropy.
+    /// Temperature of the softmax in targets, losses and entropy.
     heat: f32,
+    /// Weight of the state value in the targets.
+    discount: f32,
+    /// How the twin critics are combined.
+    twin_minimum: TwinMinimum,
 }
 
 /// A transition under a preference.
-type Sample<'a, E> = (&'a Remembered<E>, Preference);
+type Sample<'a, E> = (&'a TransitionOf<E>, Preference);
 
-impl<E: Encoding> learner::Learner for Learner<E> {
+impl<E: Encoding> Algorithm for Mosac<E> {
     type Encoding = E;
     type Losses = Losses;
-    const SYSTEM: System = E::MOSAC;
+    const NAME: &'static str = E::MOSAC_NAME;
 
-    fn new(settings: &Settings, rng: &mut ChaCha8Rng) -> Learner<E> {
-        let critics = [Trained::new(&critic::<E>(), rng), Trained::new(&critic::<E>(), rng)];
-        Learner {
-            actor: Trained::new(&actor::<E>(), rng),
+    fn new(settings: &Settings, rng: &mut ChaCha8Rng) -> Mosac<E> {
+        let critics = [TrainedNetwork::new(&critic::<E>(), rng), TrainedNetwork::new(&critic::<E>(), rng)];
+        Mosac {
+            actor: TrainedNetwork::new(&actor::<E>(), rng),
             targets: critics.each_ref().map(|critic| critic.parameters.clone()),
             critics,
-            log_entropy_weight: vec![settings.entropy_weight.ln()],
-            adam_entropy: Adam::new(1, 0.0),
+            log_entropy_coefficient: vec![settings.entropy_weight.ln()],
+            entropy_adam: Adam::new(1, 0.0),
             scratch: Scratch::default(),
         }
     }
@@ -85,7 +90,7 @@ impl<E: Encoding> learner::Learner for Learner<E> {
         actor::<E>()
     }
 
-    fn deciding(&self) -> &[f32] {
+    fn policy_parameters(&self) -> &[f32] {
         &self.actor.parameters
     }
 
@@ -94,13 +99,15 @@ impl<E: Encoding> learner::Learner for Learner<E> {
         encoding: &E,
         settings: &Settings,
         update: u64,
-        transitions: &[&Remembered<E>],
+        transitions: &[&TransitionOf<E>],
         preferences: &[Preference],
     ) -> Losses {
-        let rates = Rates {
+        let update_settings = UpdateSettings {
             learning_rate: settings.learning_rate_at(update),
             entropy_target: settings.entropy_target_at(update),
             heat: if settings.heat_in_policy { settings.heat_at(update) } else { 1.0 },
+            discount: bootstrap_discount(settings),
+            twin_minimum: settings.twin_minimum,
         };
         let copies = settings.preferences;
         debug_assert_eq!(preferences.len(), transitions.len() * copies);
@@ -110,13 +117,15 @@ impl<E: Encoding> learner::Learner for Learner<E> {
             .map(|(index, &preference)| (transitions[index / copies], preference))
             .collect();
         self.scratch.pack(encoding, transitions, preferences);
-        let targets = self.targets(settings, &samples, rates);
-        let (critic, values) = self.update_critics(&samples, &targets, rates);
-        let (actor, entropy) = self.update_actor(&samples, &values, rates);
+        let rewards: Vec<_> =
+            samples.iter().map(|(transition, _)| learning_reward::<E>(settings, transition)).collect();
+        let targets = self.targets(rewards, &samples, update_settings);
+        let (critic, values) = self.update_critics(&samples, &targets, update_settings);
+        let (actor, entropy) = self.update_actor(&samples, &values, update_settings);
         for (target, critic) in self.targets.iter_mut().zip(&self.critics) {
             net::polyak(target, &critic.parameters, settings.polyak);
         }
-        Losses { critic, actor, entropy, entropy_weight: self.entropy_weight() }
+        Losses { critic, actor, entropy, entropy_weight: self.entropy_coefficient() }
     }
 
     fn scores(logits: &[f32], _: Preference) -> [f32; ACTIONS] {
@@ -137,56 +146,53 @@ fn critic<E: Encoding>() -> E::Network {
     E::network(VALUES)
 }
 
-impl<E: Encoding> Learner<E> {
-    fn entropy_weight(&self) -> f32 {
-        self.log_entropy_weight[0].exp()
+impl<E: Encoding> Mosac<E> {
+    fn entropy_coefficient(&self) -> f32 {
+        self.log_entropy_coefficient[0].exp()
     }
 
-    /// y = r + gamma E_a' [min(T1, T2) - nu log pi], per objective (paper, eq. 17 with twin critics).
+    /// y = r + gamma^n E_a' [min(T1, T2) - nu ln pi], per objective (paper, eq. 17 with twin critics). `rewards`
+    /// becomes the targets.
     fn targets(
         &mut self,
-        settings: &Settings,
+        mut rewards: Vec<[f32; OBJECTIVES]>,
         samples: &[Sample<'_, E>],
-        rates: Rates,
+        settings: UpdateSettings,
     ) -> Vec<[f32; OBJECTIVES]> {
-        let nu = self.entropy_weight();
+        let nu = self.entropy_coefficient();
         let Scratch { after, workspace, .. } = &mut self.scratch;
         let logits: Vec<[f32; ACTIONS]> =
             actor::<E>().forward(&self.actor.parameters, after, workspace).as_chunks().0.to_vec();
         let first: Vec<[f32; VALUES]> =
             critic::<E>().forward(&self.targets[0], after, workspace).as_chunks().0.to_vec();
         let second = critic::<E>().forward(&self.targets[1], after, workspace).as_chunks::<VALUES>().0;
-        samples
-            .iter()
-            .enumerate()
-            .map(|(index, (transition, _))| {
-                let mut target = seen_reward::<E>(settings, transition);
-                if !transition.over {
-                    let policy = Distribution::heated(&logits[index], rates.heat, transition.mask_after);
-                    for (objective, target) in target.iter_mut().enumerate() {
-                        let value = policy.expectation(|action| {
-                            let at = action * OBJECTIVES + objective;
-                            first[index][at].min(second[index][at]) - nu * policy.log_probability[action]
-                        });
-                        *target += settings.discount * value;
-                    }
-                }
-                target
-            })
-            .collect()
+        for (index, (target, (transition, preference))) in rewards.iter_mut().zip(samples).enumerate() {
+            if transition.over {
+                continue;
+            }
+            let policy = Distribution::heated(&logits[index], settings.heat, transition.mask_after);
+            let values = twin_minimum(settings.twin_minimum, &first[index], &second[index], *preference);
+            for (objective, target) in target.iter_mut().enumerate() {
+                let state_value = policy.expectation(|action| {
+                    values[action * OBJECTIVES + objective] - nu * policy.log_probability[action]
+                });
+                *target += settings.discount * state_value;
+            }
+        }
+        rewards
     }
 
-    /// Returns the loss and, for each sample and action, the scalarised lower value before the step.
+    /// A step of both critics. Returns the loss and, for each sample and action, the scalarised twin minimum before the
+    /// step.
     fn update_critics(
         &mut self,
         samples: &[Sample<'_, E>],
         targets: &[[f32; OBJECTIVES]],
-        rates: Rates,
+        settings: UpdateSettings,
     ) -> (f32, Vec<[f32; ACTIONS]>) {
         let scale = 1.0 / samples.len() as f32;
         let mut loss = 0.0;
-        let mut lower: Vec<[f32; VALUES]> = vec![[f32::INFINITY; VALUES]; samples.len()];
-        for trained in &mut self.critics {
+        let [first, second] = self.critics.each_mut().map(|trained| {
             trained.zero_gradients();
             let Scratch { before, workspace, .. } = &mut self.scratch;
             let values = critic::<E>().forward_backward(
@@ -206,26 +212,26 @@ impl<E: Encoding> Learner<E> {
                 },
                 &mut trained.gradients,
             );
-            for (lower, values) in lower.iter_mut().zip(values.as_chunks::<VALUES>().0) {
-                for (lower, value) in lower.iter_mut().zip(values) {
-                    *lower = lower.min(*value);
-                }
-            }
-            trained.descend(rates.learning_rate);
-        }
-        let scalarised =
-            lower.iter().zip(samples).map(|(values, (_, preference))| scalarise(values, *preference));
-        (loss, scalarised.collect())
+            let values = values.as_chunks::<VALUES>().0.to_vec();
+            trained.descend(settings.learning_rate);
+            values
+        });
+        let values = first.iter().zip(&second).zip(samples);
+        let lower = values.map(|((first, second), (_, preference))| {
+            scalarise(&twin_minimum(settings.twin_minimum, first, second, *preference), *preference)
+        });
+        (loss, lower.collect())
     }
 
-    /// J_pi = E [sum_a pi (nu log pi - w . Q)] (paper, eq. 18); then nu towards the target entropy (eq. 19).
+    /// A step of the actor (paper, eq. 18), then a step of nu towards the target entropy (eq. 19). Returns the actor's
+    /// loss and the entropy.
     fn update_actor(
         &mut self,
         samples: &[Sample<'_, E>],
         values: &[[f32; ACTIONS]],
-        rates: Rates,
+        settings: UpdateSettings,
     ) -> (f32, f32) {
-        let nu = self.entropy_weight();
+        let nu = self.entropy_coefficient();
         let scale = 1.0 / samples.len() as f32;
         let (mut loss, mut entropy, mut excess) = (0.0, 0.0, 0.0);
         self.actor.zero_gradients();
@@ -235,140 +241,109 @@ impl<E: Encoding> Learner<E> {
             before,
             workspace,
             |range, outputs, gradients| {
-                for ((logits, gradients), index) in outputs
-                    .as_chunks::<ACTIONS>()
-                    .0
-                    .iter()
-                    .zip(gradients.as_chunks_mut::<ACTIONS>().0)
-                    .zip(range)
+                let rows = outputs.as_chunks::<ACTIONS>().0.iter();
+                for ((logits, gradients), index) in
+                    rows.zip(gradients.as_chunks_mut::<ACTIONS>().0).zip(range)
                 {
                     let mask = samples[index].0.mask_before;
-                    let policy = Distribution::heated(logits, rates.heat, mask);
-                    let cost = |action: usize| nu * policy.log_probability[action] - values[index][action];
-                    let mean = policy.expectation(cost);
-                    // d/dl_a sum_b pi_b f_b = pi_a (f_a - mean) / heat; the derivative of log pi cancels.
-                    for (action, gradient) in gradients.iter_mut().enumerate() {
-                        let probability = policy.probability[action];
-                        *gradient = if probability > 0.0 {
-                            scale * probability * (cost(action) - mean) / rates.heat
-                        } else {
-                            0.0
-                        };
-                    }
-                    let own = -policy.expectation(|action| policy.log_probability[action]);
-                    loss += scale * mean;
+                    let policy = Distribution::heated(logits, settings.heat, mask);
+                    loss += scale * actor_loss(&policy, settings.heat, nu, &values[index], gradients);
+                    gradients.iter_mut().for_each(|gradient| *gradient *= scale);
+                    let own = policy.entropy();
                     entropy += scale * own;
-                    excess += scale * (own - rates.entropy_target * (mask.len() as f32).ln());
+                    excess += scale * (own - settings.entropy_target * (mask.len() as f32).ln());
                 }
             },
             &mut self.actor.gradients,
         );
-        self.actor.descend(rates.learning_rate);
-        self.adam_entropy.lr = rates.learning_rate;
-        self.adam_entropy.step(&mut self.log_entropy_weight, &[nu * excess]);
+        self.actor.descend(settings.learning_rate);
+        self.entropy_adam.lr = settings.learning_rate;
+        self.entropy_adam.step(&mut self.log_entropy_coefficient, &[nu * excess]);
         (loss, entropy)
     }
 }
 
-/// A policy over the allowed actions.
-#[derive(Clone, Copy, Debug)]
-pub struct Distribution {
-    /// Zero outside the mask.
-    pub probability: [f32; ACTIONS],
-    /// Zero outside the mask, where it is never used.
-    pub log_probability: [f32; ACTIONS],
+/// J = sum_a pi(a) (nu ln pi(a) - w . Q(a)) with pi the softmax of `logits / heat`. Writes dJ / d logits.
+fn actor_loss(
+    policy: &Distribution,
+    heat: f32,
+    nu: f32,
+    values: &[f32; ACTIONS],
+    gradients: &mut [f32; ACTIONS],
+) -> f32 {
+    let cost = |action: usize| nu * policy.log_probability[action] - values[action];
+    let mean = policy.expectation(cost);
+    // d/dl_a sum_b pi_b f_b = pi_a (f_a - mean) / heat; the derivative of ln pi inside f sums to zero.
+    for (action, gradient) in gradients.iter_mut().enumerate() {
+        let probability = policy.probability[action];
+        *gradient = if probability > 0.0 { probability * (cost(action) - mean) / heat } else { 0.0 };
+    }
+    mean
 }
 
-impl Distribution {
-    /// The softmax of the allowed logits. An empty mask counts as full: it is only met past the end of a flight.
-    #[must_use]
-    pub fn new(logits: &[f32; ACTIONS], mask: ActionMask) -> Distribution {
-        let mask = if mask.is_empty() { ActionMask::FULL } else { mask };
-        let highest = mask.iter().map(|action| logits[action.index()]).fold(f32::NEG_INFINITY, f32::max);
-        let mut distribution = Distribution { probability: [0.0; ACTIONS], log_probability: [0.0; ACTIONS] };
-        let sum: f32 = mask.iter().map(|action| (logits[action.index()] - highest).exp()).sum();
-        for action in mask.iter().map(Action::index) {
-            distribution.log_probability[action] = logits[action] - highest - sum.ln();
-            distribution.probability[action] = distribution.log_probability[action].exp();
+/// The pessimistic values of two critics.
+fn twin_minimum(
+    rule: TwinMinimum,
+    first: &[f32; VALUES],
+    second: &[f32; VALUES],
+    preference: Preference,
+) -> [f32; VALUES] {
+    match rule {
+        TwinMinimum::PerObjective => std::array::from_fn(|at| first[at].min(second[at])),
+        TwinMinimum::Scalarised => {
+            let [one, two] = [first, second].map(|values| scalarise(values, preference));
+            std::array::from_fn(|at| {
+                let action = at / OBJECTIVES;
+                if two[action] < one[action] { second[at] } else { first[at] }
+            })
         }
-        distribution
-    }
-
-    /// The softmax of the allowed logits at this temperature (paper, eq. 20).
-    #[must_use]
-    pub fn heated(logits: &[f32; ACTIONS], heat: f32, mask: ActionMask) -> Distribution {
-        Distribution::new(&logits.map(|logit| logit / heat), mask)
-    }
-
-    /// The best of the allowed actions, but a random one of them in a share `epsilon` of all cases.
-    #[must_use]
-    pub fn epsilon_greedy(epsilon: f32, scores: &[f32; ACTIONS], mask: ActionMask) -> Distribution {
-        let mut distribution = Distribution::new(&[0.0; ACTIONS], mask);
-        let Some(best) = mask.argmax(scores) else { return distribution };
-        for (action, probability) in distribution.probability.iter_mut().enumerate() {
-            *probability *= epsilon;
-            *probability += if action == best.index() { 1.0 - epsilon } else { 0.0 };
-        }
-        distribution.log_probability = distribution.probability.map(|p| if p > 0.0 { p.ln() } else { 0.0 });
-        distribution
-    }
-
-    /// sum_a pi(a) f(a).
-    pub fn expectation(&self, value: impl Fn(usize) -> f32) -> f32 {
-        (0..ACTIONS)
-            .filter(|&action| self.probability[action] > 0.0)
-            .map(|action| self.probability[action] * value(action))
-            .sum()
-    }
-
-    /// The allowed action at this point of the unit interval.
-    #[must_use]
-    pub fn pick(&self, unit: f32) -> Action {
-        let mut left = unit;
-        let mut last = Action::Hover;
-        for action in Action::ALL {
-            let probability = self.probability[action.index()];
-            if probability > 0.0 {
-                last = action;
-                left -= probability;
-                if left < 0.0 {
-                    break;
-                }
-            }
-        }
-        last
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use gleaner_units::Action;
 
     #[test]
-    fn forbidden_actions_have_no_probability() {
-        let mask = ActionMask::EMPTY.with(Action::Hover).with(Action::East);
-        let policy = Distribution::new(&[1.0, 50.0, 50.0, 50.0, 1.0], mask);
-        assert_eq!(policy.probability, [0.5, 0.0, 0.0, 0.0, 0.5]);
-        assert!((policy.expectation(|a| -policy.log_probability[a]) - 2.0f32.ln()).abs() < 1e-6);
-        assert_eq!(policy.pick(0.2), Action::Hover);
-        assert_eq!(policy.pick(0.7), Action::East);
-        assert_eq!(policy.pick(1.0), Action::East);
+    fn actor_gradient_matches_finite_differences_at_any_heat() {
+        let mask =
+            ActionMask::from_bits(ActionMask::FULL.bits() & !ActionMask::EMPTY.with(Action::South).bits());
+        let (values, nu) = ([0.3, -0.2, 0.9, 0.0, 0.5], 0.37);
+        let logits = [0.4, -1.1, 2.0, 0.7, -0.3];
+        for heat in [1.0, 1.5, 5.0] {
+            let loss = |logits: &[f32; ACTIONS]| {
+                let policy = Distribution::heated(logits, heat, mask);
+                f64::from(actor_loss(&policy, heat, nu, &values, &mut [0.0; ACTIONS]))
+            };
+            let mut gradient = [0.0; ACTIONS];
+            actor_loss(&Distribution::heated(&logits, heat, mask), heat, nu, &values, &mut gradient);
+            for action in 0..ACTIONS {
+                let shifted = |by: f32| {
+                    let mut logits = logits;
+                    logits[action] += by;
+                    loss(&logits)
+                };
+                let measured = (shifted(1e-2) - shifted(-1e-2)) / 2e-2;
+                let error = (measured - f64::from(gradient[action])).abs();
+                assert!(error < 1e-4, "heat {heat}, action {action}: {measured}, {gradient:?}");
+            }
+            assert_eq!(gradient[Action::South.index()], 0.0, "a forbidden action has no gradient");
+        }
     }
 
     #[test]
-    fn epsilon_greedy_takes_allowed_actions_only() {
-        let mask = ActionMask::EMPTY.with(Action::Hover).with(Action::East);
-        let policy = Distribution::epsilon_greedy(0.5, &[1.0, 50.0, 50.0, 50.0, 2.0], mask);
-        assert_eq!(policy.probability, [0.25, 0.0, 0.0, 0.0, 0.75]);
-        let sure = Distribution::epsilon_greedy(0.0, &[1.0, 50.0, 50.0, 50.0, 2.0], mask);
-        assert_eq!(sure.probability, [0.0, 0.0, 0.0, 0.0, 1.0]);
-        assert_eq!(sure.log_probability, [0.0; ACTIONS]);
-    }
-
-    #[test]
-    fn huge_logits_stay_finite() {
-        let policy = Distribution::new(&[1e30, -1e30, 0.0, 0.0, 0.0], ActionMask::FULL);
-        assert_eq!(policy.probability[0], 1.0);
-        assert!(policy.expectation(|a| policy.log_probability[a]).is_finite());
+    fn scalarised_twin_minimum_does_not_mix_critics() {
+        let (mut first, mut second) = ([0.0; VALUES], [0.0; VALUES]);
+        // Action 0: the first critic is lower in data, the second in energy and in w . Q.
+        (first[0], first[1]) = (1.0, -1.0);
+        (second[0], second[1]) = (2.0, -4.0);
+        let preference = Preference::new(0.5).unwrap();
+        let mixed = twin_minimum(TwinMinimum::PerObjective, &first, &second, preference);
+        assert_eq!(mixed[..2], [1.0, -4.0]);
+        let whole = twin_minimum(TwinMinimum::Scalarised, &first, &second, preference);
+        assert_eq!(whole[..2], [2.0, -4.0]);
+        let data = twin_minimum(TwinMinimum::Scalarised, &first, &second, Preference::DATA);
+        assert_eq!(data[..2], [1.0, -1.0]);
     }
 }

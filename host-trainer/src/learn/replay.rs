@@ -1,4 +1,4 @@
-//! What was experienced: a ring of transitions without preferences, to be relabelled with any.
+//! Replay memory: a ring of transitions without preferences, which are relabelled when a batch is drawn.
 
 use crate::env::flight::Reward;
 use gleaner_units::{Action, ActionMask};
@@ -6,22 +6,22 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// One slot of one flight; `O` is what an encoding keeps of a state.
+/// One slot of a flight, or several slots with n-step returns. `O` is what an encoding stores of a state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Transition<O> {
     /// The state.
     pub before: O,
-    /// What the guard allowed there.
+    /// The actions that the guard allowed there.
     pub mask_before: ActionMask,
-    /// What was done.
+    /// The action taken.
     pub action: Action,
-    /// Percent of data, minus battery units.
+    /// Percent of data, minus battery units; with n-step returns the discounted sum.
     pub reward: Reward,
-    /// The next state.
+    /// The next state; with n-step returns the state n slots later.
     pub after: O,
-    /// What the guard allows there.
+    /// The actions that the guard allows there.
     pub mask_after: ActionMask,
-    /// Whether the mission ended: `after` has no future.
+    /// Whether the mission ended before `after`.
     pub over: bool,
 }
 
@@ -40,7 +40,7 @@ impl<O> Replay<O> {
         Replay { capacity, next: 0, ring: Vec::new() }
     }
 
-    /// Remembers a transition and forgets the oldest if there is no room.
+    /// Adds a transition; a full memory drops its oldest.
     pub fn push(&mut self, transition: Transition<O>) {
         if self.ring.len() < self.capacity {
             self.ring.push(transition);
@@ -50,18 +50,21 @@ impl<O> Replay<O> {
         self.next = (self.next + 1) % self.capacity;
     }
 
-    /// `count` transitions, uniformly and with repetition.
+    /// `count` transitions, uniformly and with replacement.
+    ///
+    /// # Panics
+    /// When the memory is empty.
     pub fn sample(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<&Transition<O>> {
         (0..count).map(|_| &self.ring[rng.random_range(0..self.ring.len())]).collect()
     }
 
-    /// How many are remembered.
+    /// Number of transitions.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.ring.len()
     }
 
-    /// Whether nothing is remembered.
+    /// Whether there is no transition.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.ring.is_empty()

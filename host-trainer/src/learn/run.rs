@@ -1,81 +1,50 @@
-//! The training loop, read top to bottom.
+//! The off-policy training run: environment steps into a replay memory, updates from it.
 
+use crate::env::distribution::{ACTIONS, Distribution};
 use crate::env::flight::{Flight, Reward};
 use crate::env::greedy::Greedy;
-use crate::judge::evaluation::DeciderError;
-use crate::keep::checkpoint::{self, CheckpointError};
-use crate::keep::snapshot::Trained;
-use crate::learn::learner::{ACTIONS, Asked, Learner};
-use crate::learn::learning::{Learning, Pace};
-use crate::learn::mosac::Distribution;
+use crate::env::mission::random_preference;
+use crate::env::site::Site;
+use crate::judge::validation::{Tables, Validation};
+use crate::keep::checkpoint::CheckpointError;
+use crate::keep::snapshot::{LAST, Snapshot};
+use crate::learn::algorithm::{Algorithm, Inference};
+use crate::learn::n_step::NStep;
+use crate::learn::policy::NetworkPolicy;
 use crate::learn::replay::{Replay, Transition};
-use crate::learn::settings::{Settings, random_preference};
+use crate::learn::resume;
+use crate::learn::trainer::{Pace, TrainError, Trainer};
 use crate::net;
-use crate::observe::encoding::Encoding;
-use crate::systems::System;
+use crate::observe::Encoding;
+use crate::settings::Settings;
+use gleaner_policy::Preference;
 use gleaner_units::Action;
-use gleaner_world::{ScenarioError, World};
+use gleaner_world::ScenarioError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use thiserror::Error;
+use std::path::Path;
 
-pub use crate::judge::validation::{Tables, Validation};
-pub use crate::keep::snapshot::{LAST, LEARNED, Learned};
-
-/// The checkpoint's name inside the output folder.
+/// File name of the checkpoint inside the output folder.
 pub const CHECKPOINT: &str = "run.checkpoint";
-/// The learning curve's name inside the output folder: one JSON object a line.
-pub const CURVE: &str = "curve.jsonl";
-/// Share of the deciding network that its running average takes over per update. The average is what is judged and
-/// shipped: single updates are noisy, and the noise does not fly. It does not act back on the training.
+/// Step size of the running average of the policy's parameters, per update. The average is what is evaluated and
+/// exported, since single updates are noisy. It does not influence the training.
 const AVERAGING: f32 = 0.001;
+/// Share of the slots of a guided mission that GREEDY decides; the policy explores in the others.
+const GUIDED_SLOTS: f64 = 0.9;
 
-/// Why a run cannot start or go on.
-#[derive(Debug, Error)]
-pub enum TrainError {
-    /// The checkpoint.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-    /// The missions.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// The network.
-    #[error(transparent)]
-    Decider(#[from] DeciderError),
-    /// The folder belongs to another run.
-    #[error(
-        "{}: holds a run with other settings; train into another --out folder, or repeat the settings of that run",
-        path.display()
-    )]
-    OtherSettings {
-        /// The checkpoint.
-        path: PathBuf,
-    },
-    /// The folder belongs to a run of another system.
-    #[error("{}: holds a run of {found}; train into another --out folder, or give --system {found}", path.display())]
-    OtherSystem {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Whose run it is.
-        found: System,
-    },
-}
-
-/// The remembered transitions of a learner.
-type Memory<L> = Replay<<<L as Learner>::Encoding as Encoding>::Observation>;
+/// What an algorithm's encoding stores of a state.
+type State<A> = <<A as Algorithm>::Encoding as Encoding>::Observation;
 
 /// A run: everything that the next update depends on.
-pub struct Run<L: Learner> {
+pub struct OffPolicyRun<A: Algorithm> {
     settings: Settings,
-    world: Arc<World>,
-    encoding: L::Encoding,
-    learner: L,
-    replay: Memory<L>,
-    asked: Asked<L::Encoding>,
-    flights: Vec<Going>,
+    site: Site,
+    encoding: A::Encoding,
+    algorithm: A,
+    replay: Replay<State<A>>,
+    inference: Inference<A::Encoding>,
+    flights: Vec<ActiveFlight<State<A>>>,
     next_mission: u64,
     rng: ChaCha8Rng,
     update: u64,
@@ -84,17 +53,18 @@ pub struct Run<L: Learner> {
     validation: Validation,
 }
 
-/// A flight in the air, and how it came there: the checkpoint keeps the way, not the place.
-struct Going {
+/// A flight in progress. The checkpoint stores its actions, from which its state is computed again.
+struct ActiveFlight<O> {
     mission: u64,
     actions: Vec<u8>,
     flight: Flight,
     guide: Option<Greedy>,
+    n_step: NStep<O>,
 }
 
-impl Going {
-    /// What the guide would do. To be asked once a slot, since it remembers where it was going.
-    fn advice(&mut self) -> Option<Action> {
+impl<O: Clone> ActiveFlight<O> {
+    /// The guide's action. Call it exactly once per slot: the guide remembers its target.
+    fn guide_action(&mut self) -> Option<Action> {
         self.guide.as_mut().map(|guide| guide.decide(&self.flight))
     }
 
@@ -102,14 +72,28 @@ impl Going {
         self.actions.push(action.index() as u8);
         self.flight.step(action)
     }
+
+    /// Flies one slot and returns the transitions that it completes.
+    fn transitions<E: Encoding<Observation = O>>(
+        &mut self,
+        encoding: &E,
+        before: O,
+        action: Action,
+    ) -> Vec<Transition<O>> {
+        let mask_before = self.flight.mask();
+        let reward = self.step(action);
+        let (after, mask_after) = (encoding.observe(&self.flight), self.flight.mask());
+        let over = self.flight.is_over();
+        self.n_step.push(Transition { before, mask_before, action, reward, after, mask_after, over })
+    }
 }
 
-/// What the checkpoint keeps; `S`, `L` and `R` are settings, learner and replay, or references to them.
-#[derive(Serialize, Deserialize)]
-struct Stored<S, L, R> {
-    settings: S,
-    learner: L,
-    replay: R,
+/// The checkpoint after the settings. The field order is the file format.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Stored<A: Algorithm> {
+    algorithm: A,
+    replay: Replay<State<A>>,
     flights: Vec<(u64, Vec<u8>)>,
     next_mission: u64,
     rng_seed: [u8; 32],
@@ -119,91 +103,108 @@ struct Stored<S, L, R> {
     averaged: Vec<f32>,
 }
 
-impl<L: Learner> Run<L> {
-    /// Goes on from the checkpoint in `folder`, or starts a new run when there is none.
+/// [`Stored`] by reference.
+#[derive(Serialize)]
+#[serde(bound = "")]
+struct StoredRef<'a, A: Algorithm> {
+    algorithm: &'a A,
+    replay: &'a Replay<State<A>>,
+    flights: Vec<(u64, &'a [u8])>,
+    next_mission: u64,
+    rng_seed: [u8; 32],
+    rng_word: u128,
+    update: u64,
+    steps: u64,
+    averaged: &'a [f32],
+}
+
+impl<A: Algorithm> OffPolicyRun<A> {
+    /// Continues from the checkpoint in `folder`, or starts a new run if there is none.
     ///
     /// # Errors
     /// See [`TrainError`].
-    pub fn open(settings: Settings, folder: &Path) -> Result<Run<L>, TrainError> {
-        let path = folder.join(CHECKPOINT);
-        if !path.exists() {
-            return Run::new(settings);
+    pub fn open(settings: Settings, site: Site, folder: &Path) -> Result<OffPolicyRun<A>, TrainError> {
+        match resume::load::<Stored<A>>(&folder.join(CHECKPOINT), A::NAME, &settings)? {
+            Some(stored) => OffPolicyRun::restore(settings, site, stored),
+            None => OffPolicyRun::start(settings, site),
         }
-        let named = checkpoint::load_named(&path)?;
-        let found = named.name().parse().map_err(|_| CheckpointError::Format { path: path.clone() })?;
-        if found != L::SYSTEM {
-            return Err(TrainError::OtherSystem { path, found });
-        }
-        let stored: Stored<Settings, L, Memory<L>> = named.value()?;
-        // A finished run may be prolonged.
-        if (Settings { updates: settings.updates, ..stored.settings.clone() }) != settings {
-            return Err(TrainError::OtherSettings { path });
-        }
-        Run::restore(settings, stored)
     }
 
-    fn new(settings: Settings) -> Result<Run<L>, TrainError> {
+    fn start(settings: Settings, site: Site) -> Result<OffPolicyRun<A>, TrainError> {
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
-        let learner = L::new(&settings, &mut rng);
-        let mut run = Run::assemble(settings, learner, rng)?;
+        let algorithm = A::new(&settings, &mut rng);
+        let mut run = OffPolicyRun::assemble(settings, site, algorithm, rng)?;
         for _ in 0..run.settings.steps_per_update {
-            let going = run.next_flight()?;
-            run.flights.push(going);
+            let flight = run.next_flight()?;
+            run.flights.push(flight);
         }
         Ok(run)
     }
 
-    fn restore(settings: Settings, stored: Stored<Settings, L, Memory<L>>) -> Result<Run<L>, TrainError> {
+    fn restore(settings: Settings, site: Site, stored: Stored<A>) -> Result<OffPolicyRun<A>, TrainError> {
         let mut rng = ChaCha8Rng::from_seed(stored.rng_seed);
         rng.set_word_pos(stored.rng_word);
-        let mut run = Run::assemble(settings, stored.learner, rng)?;
+        let mut run = OffPolicyRun::assemble(settings, site, stored.algorithm, rng)?;
         run.replay = stored.replay;
         run.next_mission = stored.next_mission;
         run.update = stored.update;
         run.steps = stored.steps;
         run.averaged = stored.averaged;
         for (mission, actions) in stored.flights {
-            let mut going = run.begin(mission)?;
+            let mut active = run.begin(mission)?;
             for action in actions {
-                going.advice();
-                going.step(Action::from_index(usize::from(action)).unwrap_or(Action::Hover));
+                active.guide_action();
+                let before = run.encoding.observe(&active.flight);
+                let action = Action::from_index(usize::from(action)).unwrap_or(Action::Hover);
+                // The memory has the completed transitions already.
+                let _ = active.transitions(&run.encoding, before, action);
             }
-            run.flights.push(going);
+            run.flights.push(active);
         }
         Ok(run)
     }
 
-    fn assemble(settings: Settings, learner: L, rng: ChaCha8Rng) -> Result<Run<L>, TrainError> {
-        let world = Arc::new(World::default_world());
-        let validation = Validation::draw(&world, &settings)?;
-        Ok(Run {
+    fn assemble(
+        settings: Settings,
+        site: Site,
+        algorithm: A,
+        rng: ChaCha8Rng,
+    ) -> Result<OffPolicyRun<A>, TrainError> {
+        Ok(OffPolicyRun {
+            validation: Validation::draw(&site, &settings)?,
             replay: Replay::new(settings.replay),
+            encoding: A::Encoding::of(site.world().city()),
+            averaged: algorithm.policy_parameters().to_vec(),
+            inference: Inference::new(A::network()),
             settings,
-            encoding: L::Encoding::of(&world),
-            world,
-            averaged: learner.deciding().to_vec(),
-            learner,
-            asked: Asked::new(L::network()),
+            site,
+            algorithm,
             flights: Vec::new(),
             next_mission: 0,
             rng,
             update: 0,
             steps: 0,
-            validation,
         })
     }
 
-    fn begin(&self, number: u64) -> Result<Going, ScenarioError> {
-        let mission = self.settings.mission(&self.world, number)?;
-        let flight = Flight::new(&self.world, &mission.realization, mission.seed, mission.preference)?;
-        Ok(Going { mission: number, actions: Vec::new(), flight, guide: mission.guide })
+    fn begin(&self, number: u64) -> Result<ActiveFlight<State<A>>, ScenarioError> {
+        let mission = self.settings.missions().mission(&self.site, number)?;
+        let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?;
+        let n_step = NStep::new(self.settings.n_step, self.settings.discount);
+        Ok(ActiveFlight { mission: number, actions: Vec::new(), flight, guide: mission.guide, n_step })
     }
 
-    /// The averaged network as it stands.
-    fn last(&self) -> Learned {
-        Learned {
-            system: L::SYSTEM,
-            method: method(L::SYSTEM),
+    fn next_flight(&mut self) -> Result<ActiveFlight<State<A>>, ScenarioError> {
+        let mission = self.next_mission;
+        self.next_mission += 1;
+        self.begin(mission)
+    }
+
+    /// The averaged policy as it is now.
+    fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            system: A::NAME.to_owned(),
+            method: method(A::NAME),
             settings: self.settings.clone(),
             actor: self.averaged.clone(),
             update: self.update,
@@ -212,53 +213,46 @@ impl<L: Learner> Run<L> {
         }
     }
 
-    fn next_flight(&mut self) -> Result<Going, ScenarioError> {
-        let mission = self.next_mission;
-        self.next_mission += 1;
-        self.begin(mission)
-    }
-
-    /// One slot of every flight, explored as the learner does.
-    fn fly(&mut self, uniform: bool) -> Result<(), TrainError> {
-        let observations: Vec<_> =
-            self.flights.iter().map(|going| self.encoding.observe(&going.flight)).collect();
-        let scores = self.scores(&observations);
-        for (index, (before, scores)) in observations.into_iter().zip(scores).enumerate() {
-            let going = &mut self.flights[index];
-            let mask_before = going.flight.mask();
+    /// One slot of every flight, with the algorithm's exploration or uniformly random actions.
+    fn collect(&mut self, uniform: bool) -> Result<(), TrainError> {
+        let states: Vec<_> =
+            self.flights.iter().map(|active| self.encoding.observe(&active.flight)).collect();
+        let scores = self.scores(&states);
+        for (index, (before, scores)) in states.into_iter().zip(scores).enumerate() {
+            let active = &mut self.flights[index];
+            let mask = active.flight.mask();
             let policy = if uniform {
-                Distribution::new(&[0.0; ACTIONS], mask_before)
+                Distribution::new(&[0.0; ACTIONS], mask)
             } else {
-                L::explore(&self.settings, self.update, &scores, mask_before)
+                A::explore(&self.settings, self.update, &scores, mask)
             };
-            let explored = policy.pick(self.rng.random());
-            let guided = !uniform && self.rng.random_bool(0.9);
-            let action = going.advice().filter(|_| guided).unwrap_or(explored);
-            let reward = going.step(action);
-            let over = going.flight.is_over();
-            let (after, mask_after) = (self.encoding.observe(&going.flight), going.flight.mask());
-            self.replay.push(Transition { before, mask_before, action, reward, after, mask_after, over });
+            let explored = policy.sample(self.rng.random());
+            let is_guided = !uniform && self.rng.random_bool(GUIDED_SLOTS);
+            let action = active.guide_action().filter(|_| is_guided).unwrap_or(explored);
+            for transition in active.transitions(&self.encoding, before, action) {
+                self.replay.push(transition);
+            }
             self.steps += 1;
-            if over {
+            if active.flight.is_over() {
                 self.flights[index] = self.next_flight()?;
             }
         }
         Ok(())
     }
 
-    /// What the deciding network says of each action in each flight.
-    fn scores(&mut self, observations: &[<L::Encoding as Encoding>::Observation]) -> Vec<[f32; ACTIONS]> {
-        let preferences = self.flights.iter().map(|going| going.flight.preference());
-        let states = observations.iter().zip(preferences.clone());
-        let answers = self.asked.answer(&self.encoding, self.learner.deciding(), states);
-        let answers = answers.chunks_exact(answers.len() / observations.len());
-        answers.zip(preferences).map(|(answer, preference)| L::scores(answer, preference)).collect()
+    /// The policy's scores of the actions of every flight.
+    fn scores(&mut self, states: &[State<A>]) -> Vec<[f32; ACTIONS]> {
+        let preferences = self.flights.iter().map(|active| active.flight.preference());
+        let inputs = states.iter().zip(preferences.clone());
+        let outputs = self.inference.outputs(&self.encoding, self.algorithm.policy_parameters(), inputs);
+        let outputs = outputs.chunks_exact(outputs.len() / states.len());
+        outputs.zip(preferences).map(|(outputs, preference)| A::scores(outputs, preference)).collect()
     }
 }
 
-impl<L: Learner> Learning for Run<L> {
-    type Losses = L::Losses;
-    const PACE: Pace = Pace::QUICK;
+impl<A: Algorithm> Trainer for OffPolicyRun<A> {
+    type Losses = A::Losses;
+    const PACE: Pace = Pace::FAST;
 
     fn settings(&self) -> &Settings {
         &self.settings
@@ -272,58 +266,69 @@ impl<L: Learner> Learning for Run<L> {
         self.steps
     }
 
-    /// Fills the memory first, then flies as many slots per update as the settings say.
-    fn advance(&mut self) -> Result<L::Losses, TrainError> {
-        while self.replay.len() < self.settings.warm_up.min(self.settings.replay) {
-            self.fly(true)?;
+    /// Fills the memory first, then makes [`Settings::steps_per_update`] environment steps and one update.
+    fn advance(&mut self) -> Result<A::Losses, TrainError> {
+        while self.replay.len() < self.settings.warm_up.min(self.settings.replay) || self.replay.is_empty() {
+            self.collect(true)?;
         }
-        self.fly(false)?;
+        self.collect(false)?;
         let transitions = self.replay.sample(self.settings.batch, &mut self.rng);
-        let preferences: Vec<_> = (0..self.settings.batch * self.settings.preferences)
-            .map(|_| {
-                // The corners are a null set of the uniform distribution, and what operators use most.
-                match self.rng.random_range(0..20) {
-                    0 => gleaner_policy::Preference::DATA,
-                    1 => gleaner_policy::Preference::ENERGY,
-                    _ => random_preference(&mut self.rng),
-                }
-            })
-            .collect();
+        let preferences = relabelling(&self.settings, &mut self.rng);
         let losses =
-            self.learner.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
+            self.algorithm.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
         self.update += 1;
-        // A plain mean at first, so that the untrained start is soon forgotten.
+        // A plain mean at first, so that the average soon forgets the initial parameters.
         let share = AVERAGING.max(1.0 / self.update as f32);
-        net::polyak(&mut self.averaged, self.learner.deciding(), share);
+        net::polyak(&mut self.averaged, self.algorithm.policy_parameters(), share);
         Ok(losses)
     }
 
-    fn validate(&mut self, best: &mut Option<Learned>) -> Result<Tables, TrainError> {
-        let tables = self.validation.tables(&self.world, &mut Trained::<L>::new(&self.averaged))?;
-        Learned { score: tables.score(), ..self.last() }.offer(best);
+    fn validate(&mut self, best: &mut Option<Snapshot>) -> Result<Tables, TrainError> {
+        let mut policy = NetworkPolicy::<A>::new(&self.averaged);
+        let tables = self.validation.tables(self.site.world(), &mut policy)?;
+        Snapshot { score: tables.score(), ..self.snapshot() }.offer(best);
         Ok(tables)
     }
 
-    /// Writes the averaged network as it stands to [`LAST`], too.
     fn save(&mut self, folder: &Path) -> Result<(), CheckpointError> {
-        let stored = Stored {
-            settings: &self.settings,
-            learner: &self.learner,
+        let stored = StoredRef::<A> {
+            algorithm: &self.algorithm,
             replay: &self.replay,
-            flights: self.flights.iter().map(|going| (going.mission, going.actions.clone())).collect(),
+            flights: self.flights.iter().map(|active| (active.mission, &active.actions[..])).collect(),
             next_mission: self.next_mission,
             rng_seed: self.rng.get_seed(),
             rng_word: self.rng.get_word_pos(),
             update: self.update,
             steps: self.steps,
-            averaged: self.averaged.clone(),
+            averaged: &self.averaged,
         };
-        checkpoint::save_named(&folder.join(CHECKPOINT), L::SYSTEM.name(), &stored)?;
-        self.last().save_in(&folder.join(LAST))
+        resume::save(&folder.join(CHECKPOINT), A::NAME, &self.settings, &stored)?;
+        self.snapshot().save(&folder.join(LAST))
     }
 }
 
+/// Preferences to relabel a batch with: pure ones in their share, which a uniform draw never gives, else uniform. The
+/// flights have the full share of pure preferences; half of it is enough here.
+fn relabelling(settings: &Settings, rng: &mut ChaCha8Rng) -> Vec<Preference> {
+    let share = settings.pure_preferences / 2.0;
+    (0..settings.batch * settings.preferences)
+        .map(|_| {
+            let choice: f64 = rng.random();
+            if choice < share / 2.0 {
+                Preference::DATA
+            } else if choice < share {
+                Preference::ENERGY
+            } else {
+                random_preference(rng)
+            }
+        })
+        .collect()
+}
+
 /// The command that trains a system, without its settings.
-fn method(system: System) -> String {
-    if system == System::default() { "train".into() } else { format!("train --system {system}") }
+fn method(system: &str) -> String {
+    match system {
+        "gleaner" => "train".to_owned(),
+        _ => format!("train --system {system}"),
+    }
 }

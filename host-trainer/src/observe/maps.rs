@@ -1,41 +1,46 @@
-//! The centred local and global maps of the CGL systems (paper, section III-C; after Theile et al. 2021), painted
-//! anew from what the replay memory keeps.
+//! The centred local and global maps of the CGL systems (paper, section III-C; after Theile et al. 2021).
 //!
-//! Four layers, all seen from the aircraft: building heights; the zones, 1 at the start and -1 at the terminal (-1
-//! where they are the same cell, which the paper leaves open); the data left at each device; the aircraft. Outside
-//! the city the heights are the greatest, everything else is 0. The global map averages windows
-//! of 5 x 5 cells, laid so that the aircraft is in the middle of the middle one: of the 79 x 59 cells that a centred
-//! 40 x 30 city can span, 75 x 55 are seen, and the outermost two on each side are left out.
+//! Four layers, all centred on the aircraft: building heights; the zones, 1 at the start and -1 at the terminal (-1
+//! where both are one cell, a case that the paper leaves open); the data left at each device; the aircraft. Outside the
+//! city the height is the greatest possible and everything else is 0. The global map averages windows of 5 x 5 cells,
+//! with the aircraft in the middle of the middle window: of the 79 x 59 cells that a centred 40 x 30 city can span it
+//! shows 75 x 55.
+//!
+//! The replay memory stores a [`Scene`]; the maps are drawn when a batch is packed.
 
 use crate::env::flight::Flight;
 use crate::net::{
     GLOBAL_NUMBERS, GLOBAL_SIZE, GLOBAL_WINDOW, LOCAL_NUMBERS, LOCAL_SIDE, MAP_CHANNELS, MapBatch, MapShape,
 };
-use crate::observe::encoding::{Encoding, weights};
-use crate::systems::System;
+use crate::observe::{Encoding, weights};
 use gleaner_policy::{Preference, schema};
 use gleaner_units::{Cell, HeightMap, Metres};
-use gleaner_world::World;
+use gleaner_world::City;
 use serde::{Deserialize, Serialize};
 
-/// The layers of a map.
+/// Indices of the layers.
 const HEIGHTS: usize = 0;
 const ZONES: usize = 1;
 const DATA: usize = 2;
 const AIRCRAFT: usize = 3;
 
-/// Cells west and south of the aircraft that the local map shows; one less east and north.
+/// Cells of the local map west and south of the aircraft; one less east and north.
 const LOCAL_REACH: i16 = (LOCAL_SIDE / 2) as i16;
-/// Cells of the global map west and south of the aircraft's window.
+/// Windows of the global map west and south of the aircraft's window.
 const GLOBAL_MIDDLE: (i16, i16) = ((GLOBAL_SIZE.0 / 2) as i16, (GLOBAL_SIZE.1 / 2) as i16);
+/// Side of a window, cells.
 const WINDOW: i16 = GLOBAL_WINDOW as i16;
-/// The height that stands for "outside the city", and the one that the network reads as 1.
+/// Height outside the city, m.
 const OUTSIDE_HEIGHT_M: f32 = 50.0;
+/// Height that enters the network as 1, m.
 const HEIGHT_SCALE_M: f32 = 50.0;
-/// Share of a window's mean that one of its cells has.
-const SHARE: f32 = 1.0 / (GLOBAL_WINDOW * GLOBAL_WINDOW) as f32;
+/// Weight of one cell in the mean of its window.
+const CELL_SHARE: f32 = 1.0 / (GLOBAL_WINDOW * GLOBAL_WINDOW) as f32;
 
-/// What the replay memory keeps: about 100 bytes with six devices, where the painted maps are 4,240.
+type LocalMap = [f32; LOCAL_NUMBERS];
+type GlobalMap = [f32; GLOBAL_NUMBERS];
+
+/// What the replay memory stores: about 100 bytes with six devices, where the drawn maps have 4,240.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
     uav: Cell,
@@ -43,17 +48,46 @@ pub struct Scene {
     terminal: Cell,
     battery_units: f32,
     spare_units: f32,
-    /// Where each device stands and what it holds, data units.
+    /// Cell and remaining data of each device, data units.
     devices: Vec<(Cell, f32)>,
 }
 
-/// The height of a cell as the paper's networks read it.
+impl Scene {
+    /// The current state of a flight.
+    pub(crate) fn of(flight: &Flight) -> Scene {
+        let episode = flight.episode();
+        Scene {
+            uav: episode.uav(),
+            start: flight.start(),
+            terminal: episode.terminal(),
+            battery_units: episode.battery().0,
+            spare_units: flight.spare().0,
+            devices: (episode.devices().iter().enumerate())
+                .map(|(index, device)| (device.cell, flight.report(index).1))
+                .collect(),
+        }
+    }
+
+    /// Calls `mark(cell, layer, value)` for everything but the heights.
+    fn marks(&self, mut mark: impl FnMut(Cell, usize, f32)) {
+        if self.start != self.terminal {
+            mark(self.start, ZONES, 1.0);
+        }
+        mark(self.terminal, ZONES, -1.0);
+        for &(cell, remaining_units) in &self.devices {
+            mark(cell, DATA, schema::REMAINING.apply(remaining_units));
+        }
+        mark(self.uav, AIRCRAFT, 1.0);
+    }
+}
+
+/// The normalised height of a cell.
 pub(crate) fn height(heights: &HeightMap, cell: Cell) -> f32 {
     let height_m = heights.height(cell).map_or(OUTSIDE_HEIGHT_M, |Metres(height_m)| height_m);
     height_m / HEIGHT_SCALE_M
 }
 
-/// Paints scenes of one city.
+/// Draws the maps of scenes in one city.
 #[derive(Clone, Debug)]
 pub struct Maps {
     heights: HeightMap,
@@ -75,7 +109,7 @@ impl Maps {
         Maps { heights: heights.clone(), sums_m }
     }
 
-    /// The mean height of a window as the network reads it.
+    /// The normalised mean height of a window.
     fn mean_height(&self, south_west: Cell) -> f32 {
         let grid = self.heights.grid();
         let (width, height) = (i32::from(grid.width()), i32::from(grid.height()));
@@ -87,19 +121,40 @@ impl Maps {
         let sum = |x: usize, y: usize| self.sums_m[y * (width as usize + 1) + x];
         let inside_m = sum(east, north) + sum(west, south) - sum(west, north) - sum(east, south);
         let outside = GLOBAL_WINDOW * GLOBAL_WINDOW - (east - west) * (north - south);
-        SHARE * (inside_m as f32 + outside as f32 * OUTSIDE_HEIGHT_M) / HEIGHT_SCALE_M
+        CELL_SHARE * (inside_m as f32 + outside as f32 * OUTSIDE_HEIGHT_M) / HEIGHT_SCALE_M
     }
 
-    fn paint_heights(&self, uav: Cell, local: &mut [f32; LOCAL_NUMBERS], global: &mut [f32; GLOBAL_NUMBERS]) {
+    /// Draws the local map of a scene; `local` must be zero.
+    pub(crate) fn draw_local(&self, scene: &Scene, local: &mut LocalMap) {
         for (index, cell) in local.chunks_exact_mut(MAP_CHANNELS).enumerate() {
-            cell[HEIGHTS] = height(&self.heights, local_cell(uav, index));
+            cell[HEIGHTS] = height(&self.heights, local_cell(scene.uav, index));
         }
+        scene.marks(|cell, layer, value| {
+            let (x, y) = (cell.x - scene.uav.x + LOCAL_REACH, cell.y - scene.uav.y + LOCAL_REACH);
+            let side = LOCAL_SIDE as i16;
+            if (0..side).contains(&x) && (0..side).contains(&y) {
+                local[(y as usize * LOCAL_SIDE + x as usize) * MAP_CHANNELS + layer] += value;
+            }
+        });
+    }
+
+    /// Draws the global map of a scene; `global` must be zero.
+    fn draw_global(&self, scene: &Scene, global: &mut GlobalMap) {
+        let uav = scene.uav;
         let (west, south) =
             (uav.x - WINDOW / 2 - GLOBAL_MIDDLE.0 * WINDOW, uav.y - WINDOW / 2 - GLOBAL_MIDDLE.1 * WINDOW);
         for (index, cell) in global.chunks_exact_mut(MAP_CHANNELS).enumerate() {
             let (east, north) = ((index % GLOBAL_SIZE.0) as i16, (index / GLOBAL_SIZE.0) as i16);
             cell[HEIGHTS] = self.mean_height(Cell::new(west + east * WINDOW, south + north * WINDOW));
         }
+        scene.marks(|cell, layer, value| {
+            let window = |offset: i16, middle: i16| (offset + WINDOW / 2).div_euclid(WINDOW) + middle;
+            let (x, y) = (window(cell.x - uav.x, GLOBAL_MIDDLE.0), window(cell.y - uav.y, GLOBAL_MIDDLE.1));
+            if (0..GLOBAL_SIZE.0 as i16).contains(&x) && (0..GLOBAL_SIZE.1 as i16).contains(&y) {
+                let window = y as usize * GLOBAL_SIZE.0 + x as usize;
+                global[window * MAP_CHANNELS + layer] += CELL_SHARE * value;
+            }
+        });
     }
 }
 
@@ -109,117 +164,81 @@ pub(crate) fn local_cell(uav: Cell, index: usize) -> Cell {
     Cell::new(uav.x + east - LOCAL_REACH, uav.y + north - LOCAL_REACH)
 }
 
-/// Adds a mark to the cell and to the window in which it lies, where the maps show them.
-fn mark(
-    (uav, cell): (Cell, Cell),
-    channel: usize,
-    value: f32,
-    local: &mut [f32; LOCAL_NUMBERS],
-    global: &mut [f32; GLOBAL_NUMBERS],
-) {
-    let (east, north) = (cell.x - uav.x, cell.y - uav.y);
-    let (x, y) = (east + LOCAL_REACH, north + LOCAL_REACH);
-    let side = LOCAL_SIDE as i16;
-    if (0..side).contains(&x) && (0..side).contains(&y) {
-        local[(y as usize * LOCAL_SIDE + x as usize) * MAP_CHANNELS + channel] += value;
-    }
-    let window = |offset: i16, middle: i16| (offset + WINDOW / 2).div_euclid(WINDOW) + middle;
-    let (x, y) = (window(east, GLOBAL_MIDDLE.0), window(north, GLOBAL_MIDDLE.1));
-    let (width, height) = (GLOBAL_SIZE.0 as i16, GLOBAL_SIZE.1 as i16);
-    if (0..width).contains(&x) && (0..height).contains(&y) {
-        global[(y as usize * GLOBAL_SIZE.0 + x as usize) * MAP_CHANNELS + channel] += SHARE * value;
-    }
-}
-
 impl Encoding for Maps {
     type Observation = Scene;
     type Network = MapShape;
-    const MOSAC: System = System::MosacCgl;
+    const MOSAC_NAME: &'static str = "mosac-cgl";
+    const DDQN_NAME: &'static str = "ddqn-cgl";
 
-    fn of(world: &World) -> Maps {
-        Maps::new(world.city().heights())
+    fn of(city: &City) -> Maps {
+        Maps::new(city.heights())
     }
 
     fn observe(&self, flight: &Flight) -> Scene {
-        let episode = flight.episode();
-        Scene {
-            uav: episode.uav(),
-            start: flight.start(),
-            terminal: episode.terminal(),
-            battery_units: episode.battery().0,
-            spare_units: flight.spare().0,
-            devices: episode.devices().iter().map(|device| (device.cell, device.remaining_units)).collect(),
-        }
+        Scene::of(flight)
     }
 
-    fn push(&self, seen: &Scene, preferences: &[Preference], batch: &mut MapBatch) {
+    fn push(&self, scene: &Scene, preferences: &[Preference], batch: &mut MapBatch) {
         let preferences: Vec<_> = preferences.iter().copied().map(weights).collect();
-        let (local, global) = batch.push(schema::BATTERY.apply(seen.battery_units), &preferences);
-        self.paint_heights(seen.uav, local, global);
-        if seen.start != seen.terminal {
-            mark((seen.uav, seen.start), ZONES, 1.0, local, global);
-        }
-        mark((seen.uav, seen.terminal), ZONES, -1.0, local, global);
-        for &(cell, remaining_units) in &seen.devices {
-            let remaining = schema::REMAINING.apply(remaining_units);
-            mark((seen.uav, cell), DATA, remaining, local, global);
-        }
-        mark((seen.uav, seen.uav), AIRCRAFT, 1.0, local, global);
+        let (local, global) = batch.push(schema::BATTERY.apply(scene.battery_units), &preferences);
+        self.draw_local(scene, local);
+        self.draw_global(scene, global);
     }
 
-    fn way_to_terminal(seen: &Scene) -> f32 {
-        seen.battery_units - seen.spare_units
+    fn distance_to_terminal(scene: &Scene) -> f32 {
+        scene.battery_units - scene.spare_units
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_world::{Realization, ScenarioKind, Seed};
+    use gleaner_world::{Realization, ScenarioKind, Seed, World};
     use std::sync::Arc;
 
-    /// Every layer on all 75 x 55 cells that the global map shows.
-    fn by_hand(world: &World, seen: &Scene) -> Vec<[f32; MAP_CHANNELS]> {
+    /// Every layer of all 75 x 55 cells of the global map, computed cell by cell.
+    fn reference_layers(world: &World, scene: &Scene) -> Vec<[f32; MAP_CHANNELS]> {
         let mut cells = Vec::new();
         for north in -27..=27 {
             for east in -37..=37 {
-                let cell = Cell::new(seen.uav.x + east, seen.uav.y + north);
+                let cell = Cell::new(scene.uav.x + east, scene.uav.y + north);
                 let height_m = world.city().heights().height(cell).map_or(50.0, |height| height.0);
-                let zone = if cell == seen.terminal { -1.0 } else { f32::from(u8::from(cell == seen.start)) };
-                let data: f32 = seen.devices.iter().filter(|d| d.0 == cell).map(|d| d.1 / 8000.0).sum();
-                cells.push([height_m / 50.0, zone, data, f32::from(u8::from(cell == seen.uav))]);
+                let zone =
+                    if cell == scene.terminal { -1.0 } else { f32::from(u8::from(cell == scene.start)) };
+                let data: f32 = scene.devices.iter().filter(|d| d.0 == cell).map(|d| d.1 / 8000.0).sum();
+                cells.push([height_m / 50.0, zone, data, f32::from(u8::from(cell == scene.uav))]);
             }
         }
         cells
     }
 
     fn scenes(world: &Arc<World>) -> Vec<Scene> {
-        let maps = Maps::of(world);
+        let maps = Maps::of(world.city());
         let mut scenes = Vec::new();
         for kind in ScenarioKind::ALL {
             let seed = Seed::evaluation(3);
             let realization = Realization::draw(world.city(), &kind.scenario(), seed).unwrap();
             let flight = Flight::new(world, &realization, seed, Preference::DATA).unwrap();
-            let seen = maps.observe(&flight);
-            for uav in [seen.uav, Cell::new(0, 0), Cell::new(39, 29), Cell::new(0, 17)] {
-                scenes.push(Scene { uav, ..seen.clone() });
+            let scene = maps.observe(&flight);
+            for uav in [scene.uav, Cell::new(0, 0), Cell::new(39, 29), Cell::new(0, 17)] {
+                scenes.push(Scene { uav, ..scene.clone() });
             }
         }
         scenes
     }
 
     #[test]
-    fn painted_maps_are_the_crop_and_the_window_means_of_the_whole_city() {
+    fn maps_match_a_cell_by_cell_reference() {
         let world = Arc::new(World::default_world());
-        let maps = Maps::of(&world);
-        for seen in scenes(&world) {
-            let cells = by_hand(&world, &seen);
+        let maps = Maps::of(world.city());
+        for scene in scenes(&world) {
+            let cells = reference_layers(&world, &scene);
             let mut batch = MapBatch::default();
-            maps.push(&seen, &[Preference::DATA], &mut batch);
+            maps.push(&scene, &[Preference::DATA], &mut batch);
             let (local, global) = batch.last().unwrap();
             for (index, found) in local.as_chunks::<MAP_CHANNELS>().0.iter().enumerate() {
                 let (x, y) = (37 - 5 + index % 10, 27 - 5 + index / 10);
-                assert_eq!(*found, cells[y * 75 + x], "{seen:?} local {index}");
+                assert_eq!(*found, cells[y * 75 + x], "{scene:?} local {index}");
             }
             for (index, found) in global.as_chunks::<MAP_CHANNELS>().0.iter().enumerate() {
                 let (x, y) = (5 * (index % 15), 5 * (index / 15));
@@ -228,7 +247,7 @@ mod tests {
                     let mean = window.sum::<f32>() / 25.0;
                     assert!(
                         (found - mean).abs() < 1e-5,
-                        "{seen:?} global {index}, {channel}: {found}, {mean}"
+                        "{scene:?} global {index}, {channel}: {found}, {mean}"
                     );
                 }
             }

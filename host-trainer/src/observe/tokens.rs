@@ -1,17 +1,20 @@
-//! From the tokens that fly to the numbers that the network's first layer sees.
+//! The set of tokens of the shipped policy, normalised for the network's first layer.
 
-use crate::net::{DeviceFeatures, Sample};
+use crate::env::flight::Flight;
+use crate::net::{Batch, DEVICE_FEATURES, DeviceFeatures, Sample, Shape, UAV_FEATURES};
+use crate::observe::{Encoding, weights};
 use gleaner_policy::schema::{self, Normalisation};
 use gleaner_policy::{LOCAL_MAP_CELLS, Preference, Tokens};
+use gleaner_world::City;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// What the replay memory keeps of a state: everything but the preference, small enough to keep 100,000 of
-/// them. Normalised, except for the map.
+/// What the replay memory stores of a state: all but the preference, small enough for 100,000 of them. Normalised,
+/// except for the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
-    uav: [f32; 4],
-    /// Yields in steps of [`schema::YIELD_STEP_UNITS`], as the builder makes them.
+    uav: [f32; UAV_FEATURES],
+    /// Yields in steps of [`schema::YIELD_STEP_UNITS`], the resolution of the token builder.
     local_map: Vec<i16>,
     devices: Vec<DeviceFeatures>,
 }
@@ -21,14 +24,14 @@ fn step_units() -> f32 {
 }
 
 struct Normalisations {
-    uav: [Normalisation; 4],
-    device: [Normalisation; 7],
+    uav: [Normalisation; UAV_FEATURES],
+    device: [Normalisation; DEVICE_FEATURES],
     yields: Normalisation,
 }
 
 static NORMALISATIONS: LazyLock<Normalisations> = LazyLock::new(|| {
     let of = |tensor: &str| schema::normalisations(tensor).collect::<Vec<_>>();
-    let matches = "the schema has 4 numbers for the aircraft and 7 for a device";
+    let matches = "the widths are those of the schema";
     Normalisations {
         uav: of("uav").try_into().expect(matches),
         device: of("devices").try_into().expect(matches),
@@ -36,35 +39,26 @@ static NORMALISATIONS: LazyLock<Normalisations> = LazyLock::new(|| {
     }
 });
 
+fn apply<const N: usize>(physical: &[f32; N], scales: &[Normalisation; N]) -> [f32; N] {
+    std::array::from_fn(|index| scales[index].apply(physical[index]))
+}
+
 impl Observation {
-    /// Normalises tokens and forgets their preference.
+    /// Normalises tokens and drops their preference.
     #[must_use]
     pub fn new(tokens: &Tokens) -> Observation {
         let scales = &*NORMALISATIONS;
-        let apply = |(physical, scale): (&f32, &Normalisation)| scale.apply(*physical);
-        let mut uav = [0.0; 4];
-        for (normal, pair) in uav.iter_mut().zip(tokens.uav.iter().zip(&scales.uav)) {
-            *normal = apply(pair);
+        Observation {
+            uav: apply(&tokens.uav, &scales.uav),
+            devices: tokens.devices.iter().map(|device| apply(device, &scales.device)).collect(),
+            local_map: tokens.local_map.iter().map(|&units| (units / step_units()) as i16).collect(),
         }
-        let devices = tokens
-            .devices
-            .iter()
-            .map(|device| {
-                let mut normal = [0.0; 7];
-                for (normal, pair) in normal.iter_mut().zip(device.iter().zip(&scales.device)) {
-                    *normal = apply(pair);
-                }
-                normal
-            })
-            .collect();
-        let local_map = tokens.local_map.iter().map(|&units| (units / step_units()) as i16).collect();
-        Observation { uav, local_map, devices }
     }
 
     /// Moves to the terminal: battery minus spare battery.
     #[must_use]
-    pub fn way_to_terminal(&self) -> f32 {
-        way_to_terminal(self.uav[0], self.uav[1])
+    pub fn distance_to_terminal(&self) -> f32 {
+        distance_to_terminal(&self.uav)
     }
 
     /// The network's input for this state under a preference.
@@ -72,7 +66,7 @@ impl Observation {
     pub fn with(&self, preference: Preference) -> Sample {
         let mut sample = Sample {
             uav: self.uav,
-            preference: [preference.w_data(), preference.w_energy()],
+            preference: weights(preference),
             device_count: self.devices.len() as u8,
             ..Sample::default()
         };
@@ -86,8 +80,8 @@ impl Observation {
     }
 }
 
-/// Moves to the terminal, from the normalised spare battery and battery.
-pub(crate) fn way_to_terminal(spare: f32, battery: f32) -> f32 {
+/// Moves to the terminal, from the normalised features of the aircraft: spare battery, battery, ...
+pub(crate) fn distance_to_terminal(&[spare, battery, ..]: &[f32; UAV_FEATURES]) -> f32 {
     (battery - spare) * schema::BATTERY.scale
 }
 
@@ -99,16 +93,51 @@ pub fn normalise(tokens: &Tokens) -> Sample {
     sample
 }
 
+/// The network's input for the current state of a flight.
+#[must_use]
+pub fn sample(flight: &Flight) -> Sample {
+    normalise(&flight.tokens())
+}
+
+/// The encoding of the shipped policy.
+#[derive(Clone, Copy, Debug)]
+pub struct PolicyTokens;
+
+impl Encoding for PolicyTokens {
+    type Observation = Observation;
+    type Network = Shape;
+    const MOSAC_NAME: &'static str = "gleaner";
+
+    fn of(_: &City) -> PolicyTokens {
+        PolicyTokens
+    }
+
+    fn observe(&self, flight: &Flight) -> Observation {
+        Observation::new(&flight.tokens())
+    }
+
+    fn push(&self, state: &Observation, preferences: &[Preference], batch: &mut Batch) {
+        let mut sample = state.with(Preference::ENERGY);
+        for &preference in preferences {
+            sample.preference = weights(preference);
+            batch.push_sample(&sample);
+        }
+    }
+
+    fn distance_to_terminal(state: &Observation) -> f32 {
+        state.distance_to_terminal()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use gleaner_policy::{DeviceState, Situation, View};
     use gleaner_units::{Action, BatteryUnits, Cell, Db};
-    use gleaner_world::{City, Mirror};
+    use gleaner_world::Mirror;
 
-    /// What the builder makes of a mirrored city is the view of what it makes of the city.
     #[test]
-    fn a_view_is_what_would_be_seen_in_the_mirrored_city() {
+    fn view_equals_observation_in_mirrored_city() {
         let city = City::default_city();
         let grid = city.grid();
         let open = city.open_cells();
@@ -117,7 +146,7 @@ mod tests {
             let view = View::ALL.into_iter().find(|view| {
                 Action::ALL.into_iter().all(|action| view.action(action) == mirror.action(action))
             });
-            let seen = |city: &City, mirror: Mirror, uav: Cell| {
+            let observed = |city: &City, mirror: Mirror, uav: Cell| {
                 let situation = Situation {
                     cell: mirror.cell(grid, uav),
                     battery: BatteryUnits(60.0),
@@ -134,9 +163,9 @@ mod tests {
                 normalise(&Tokens::build(&situation, devices).0)
             };
             for uav in [Cell::new(3, 4), Cell::new(20, 15), Cell::new(38, 22)] {
-                let plain = seen(&city, Mirror::default(), uav);
-                assert!(plain.local_map.iter().any(|&units| units > 0.0), "{uav} hears somebody");
-                assert_eq!(seen(&mirrored, mirror, uav), plain.seen(view.unwrap()), "{mirror:?} {uav}");
+                let plain = observed(&city, Mirror::default(), uav);
+                assert!(plain.local_map.iter().any(|&units| units > 0.0), "no yield around {uav}");
+                assert_eq!(observed(&mirrored, mirror, uav), plain.seen(view.unwrap()), "{mirror:?} {uav}");
             }
         }
     }

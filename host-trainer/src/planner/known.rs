@@ -35,7 +35,7 @@ impl Rates {
     }
 
     /// Mean SNR, dB, and expected data units per slot.
-    fn link(&self, device: Cell, uav: Cell) -> (f32, f32) {
+    pub(super) fn link(&self, device: Cell, uav: Cell) -> (f32, f32) {
         let snr_db = self.world.mean_snr(device, uav).map_or(f32::NEG_INFINITY, |snr| snr.0);
         let table = &self.tables[usize::from(self.world.city().line_of_sight(device, uav))];
         let index = ((snr_db - TABLE_FROM_DB) / TABLE_STEP_DB).round();

@@ -9,19 +9,16 @@
 //! search is random, so its pupils, who see neither, learned more slowly (RD, w = (1, 0), after 6,000 updates: 68 %
 //! of the data against 72 %).
 
+use crate::env::distribution::Distribution;
 use crate::env::flight::Flight;
 use crate::env::greedy::approach;
-use crate::learn::mosac::Distribution;
+use crate::planner::known::Rates;
 use gleaner_guard::Guard;
 use gleaner_policy::Preference;
-use gleaner_units::{Action, Cell, Db, Grid};
+use gleaner_units::{Action, Cell, Grid};
 use gleaner_world::{Realization, World};
 use std::sync::Arc;
 
-/// Steps of the rate table, and its range: below nothing is carried, above nothing lies.
-const TABLE_STEP_DB: f32 = 0.25;
-const TABLE_FROM_DB: f32 = -20.0;
-const TABLE_LEN: usize = 240;
 /// What counts as empty, data units: a thousandth of a device.
 const EMPTY_UNITS: f32 = 5.0;
 
@@ -30,7 +27,7 @@ const NEAR_UNITS: f32 = 300.0;
 /// Utility that makes an action e times less likely to be taught.
 const INDIFFERENCE: f32 = 0.1;
 /// The largest weight of data that is planned with.
-const THRIFT: f32 = 0.9;
+const W_DATA_MAX: f32 = 0.9;
 /// Orders of all stops from which the first search begins, each in both directions.
 const RESTARTS: usize = 3;
 /// How near a stop may be, cells.
@@ -43,11 +40,10 @@ struct Stop {
     radius: u32,
 }
 
-/// Expected data per slot of a link by its mean SNR, with and without line of sight.
+/// Makes the courses of missions.
 #[derive(Debug)]
 pub struct Teacher {
-    world: Arc<World>,
-    rates: [Vec<f32>; 2],
+    rates: Rates,
 }
 
 /// One mission as the teacher knows it: per device and cell, mean SNR (dB) and expected data per slot.
@@ -97,35 +93,20 @@ impl Teacher {
     /// Tabulates the channel.
     #[must_use]
     pub fn new(world: Arc<World>) -> Teacher {
-        let rates = [false, true].map(|line_of_sight| {
-            (0..TABLE_LEN)
-                .map(|index| {
-                    let mean = Db(TABLE_FROM_DB + index as f32 * TABLE_STEP_DB);
-                    world.channel().expected_data_per_slot(line_of_sight, mean)
-                })
-                .collect()
-        });
-        Teacher { world, rates }
+        Teacher { rates: Rates::new(world) }
     }
 
     /// What there is to know about a mission.
     #[must_use]
     pub fn study(&self, realization: &Realization) -> Course {
-        let city = self.world.city();
-        let link = |device: Cell, uav: Cell| {
-            let snr_db = self.world.mean_snr(device, uav).map_or(f32::NEG_INFINITY, |snr| snr.0);
-            let rates = &self.rates[usize::from(city.line_of_sight(device, uav))];
-            let index = ((snr_db - TABLE_FROM_DB) / TABLE_STEP_DB).round();
-            let rate = if index < 0.0 { 0.0 } else { rates[(index as usize).min(TABLE_LEN - 1)] };
-            (snr_db, rate)
-        };
+        let grid = self.rates.grid();
         let links = realization
             .devices()
             .iter()
-            .map(|device| city.grid().cells().map(|uav| link(device.cell, uav)).collect())
+            .map(|device| grid.cells().map(|uav| self.rates.link(device.cell, uav)).collect())
             .collect();
         let initial_units = realization.devices().iter().map(|device| device.data_units).sum();
-        Course { grid: city.grid(), links, initial_units, tour: None }
+        Course { grid, links, initial_units, tour: None }
     }
 }
 
@@ -286,7 +267,7 @@ impl Course {
     fn utility(&self, start: &Start<'_>, flight: &MeanFlight) -> f32 {
         let percent = 100.0 * flight.collected / self.initial_units;
         // Data alone would make every tour that empties the battery alike; thrift finds the better ones.
-        let w_data = start.preference.w_data().min(THRIFT);
+        let w_data = start.preference.w_data().min(W_DATA_MAX);
         w_data * percent - (1.0 - w_data) * flight.energy
     }
 

@@ -1,13 +1,13 @@
-//! What can be evaluated: exported models and the runs that learn them.
+//! The subjects of a report: exported models and runs.
 
-use super::evaluate::learned;
-use super::export::load_model;
+use super::{model, snapshot_in};
 use anyhow::{Context, Result, bail};
 use gleaner_host_trainer::env::flight::Flight;
 use gleaner_host_trainer::judge::evaluation::{self, Decider, realizations};
 use gleaner_host_trainer::keep::parts::fingerprint;
-use gleaner_host_trainer::learn::run::Learned;
+use gleaner_host_trainer::keep::snapshot::Snapshot;
 use gleaner_host_trainer::report::Latency;
+use gleaner_host_trainer::systems::System;
 use gleaner_policy::Preference;
 use gleaner_policy::onnx::TractPolicy;
 use gleaner_world::{Scenario, World};
@@ -15,84 +15,84 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Decisions that are timed, after as many that are not.
+/// Decisions that are timed, after the same number for warming up.
 const TIMED: usize = 2_000;
 
-/// A learned system.
-pub struct System {
-    /// How it is called.
+/// A trained policy.
+pub struct Subject {
+    /// Its name in the report.
     pub name: String,
-    /// Where it came from and what flies it.
+    /// File or run, and the engine.
     pub origin: String,
-    /// Changes whenever its decisions may.
+    /// Changes whenever its decisions may change.
     pub identity: String,
-    /// What decides.
-    pub engine: Engine,
+    /// Its policy.
+    pub policy: SubjectPolicy,
 }
 
-/// What decides for a learned system.
-pub enum Engine {
+/// The policy of a subject.
+pub enum SubjectPolicy {
     /// An exported model in tract.
     Tract(Box<TractPolicy>),
-    /// A run's best parameters in the learner's own network.
-    Learner(Box<Learned>),
+    /// The best parameters of a run in the trainer's network.
+    Run(System, Box<Snapshot>),
 }
 
-impl System {
-    /// An ONNX model, called as its card says unless a name is given.
-    pub fn model(name: Option<&str>, path: &Path) -> Result<System> {
-        let policy = load_model(path)?;
+impl Subject {
+    /// An ONNX model, named by its card unless a name is given.
+    pub fn model(name: Option<&str>, path: &Path) -> Result<Subject> {
+        let policy = model::load(path)?;
         let info = policy.info();
         let file = path.file_name().unwrap_or(path.as_os_str()).display();
         let hash = &info.sha256[..12.min(info.sha256.len())];
-        Ok(System {
+        Ok(Subject {
             name: name.map_or_else(|| info.card.name.clone(), str::to_owned),
             origin: format!("{file}, SHA-256 {hash}..., flown in tract"),
             identity: format!("tract {}", info.sha256),
-            engine: Engine::Tract(Box::new(policy)),
+            policy: SubjectPolicy::Tract(Box::new(policy)),
         })
     }
 
-    /// The best parameters of a run, called as its folder unless a name is given.
-    pub fn run(name: Option<&str>, folder: &Path) -> Result<System> {
+    /// The best parameters of a run, named by its folder unless a name is given.
+    pub fn run(name: Option<&str>, folder: &Path) -> Result<Subject> {
         if !folder.is_dir() {
             bail!("{}: no such folder; check --run", folder.display());
         }
-        let learned = learned(folder)?;
-        let bytes: Vec<u8> = learned.actor.iter().flat_map(|number| number.to_le_bytes()).collect();
+        let (system, snapshot) = snapshot_in(folder)?;
+        let bytes: Vec<u8> = snapshot.actor.iter().flat_map(|number| number.to_le_bytes()).collect();
         let hash = fingerprint(&bytes);
         let folder = folder.file_name().unwrap_or(folder.as_os_str()).display().to_string();
-        let title = learned.system.title();
-        Ok(System {
+        let title = system.title();
+        Ok(Subject {
             name: name.map_or_else(|| format!("{title}, {folder}"), str::to_owned),
             origin: format!(
-                "run {folder}: {title}, parameters of update {} ({hash}), flown by the learner's network",
-                learned.update
+                "run {folder}: {title}, parameters of update {} ({hash}), flown by the trainer's network",
+                snapshot.update
             ),
             identity: format!("{title} {hash}"),
-            engine: Engine::Learner(Box::new(learned)),
+            policy: SubjectPolicy::Run(system, Box::new(snapshot)),
         })
     }
 }
 
-impl Engine {
-    /// Ready to fly.
+impl SubjectPolicy {
+    /// For evaluations.
     pub fn decider(&mut self) -> Box<dyn Decider + '_> {
         match self {
-            Engine::Tract(policy) => Box::new(evaluation::Engine(&mut **policy)),
-            Engine::Learner(learned) => learned.decider(),
+            SubjectPolicy::Tract(policy) => Box::new(evaluation::Engine(&mut **policy)),
+            SubjectPolicy::Run(system, snapshot) => system.policy(snapshot),
         }
     }
 
-    /// Of the policy that decides.
+    /// Number of parameters.
     pub fn parameters(&self) -> usize {
         match self {
-            Engine::Tract(policy) => policy.info().parameters,
-            Engine::Learner(learned) => learned.actor.len(),
+            SubjectPolicy::Tract(policy) => policy.info().parameters,
+            SubjectPolicy::Run(_, snapshot) => snapshot.actor.len(),
         }
     }
 
-    /// Times decisions at the start of an RD mission with six devices, one at a time.
+    /// Times single decisions at the start of an RD mission with six devices.
     pub fn latency(&mut self, world: &Arc<World>) -> Result<Latency> {
         let drawn = realizations(world, &Scenario::reach_destination(), 1)?;
         let (seed, realization) = drawn.first().context("one realization")?;

@@ -1,0 +1,34 @@
+//! `gleaner-train refine`: proximal policy optimisation of a trained policy.
+
+use super::session::{Session, SessionArguments};
+use super::snapshot_of;
+use anyhow::{Result, bail};
+use gleaner_host_trainer::learn::ppo::Refinement;
+use gleaner_host_trainer::systems::System;
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// Start with the parameters of the run in this folder. Repeatable: the mean of the parameters of runs with the same
+    /// start. FOLDER has the best parameters by validation, FOLDER/last the last ones.
+    #[arg(long, required = true, value_name = "FOLDER")]
+    from: Vec<PathBuf>,
+    /// Factor on the logits at the start: 2.5 for a distilled policy, which is uncertain, 1 for a refined one.
+    #[arg(long, default_value_t = 2.5)]
+    confidence: f32,
+    #[command(flatten)]
+    session: SessionArguments,
+}
+
+pub fn run(arguments: &mut Arguments) -> Result<()> {
+    let Arguments { from, confidence, session } = arguments;
+    if !(confidence.is_finite() && *confidence > 0.0) {
+        bail!("--confidence {confidence}: a number above 0");
+    }
+    let from = from.iter().map(|folder| snapshot_of(System::Gleaner, folder));
+    let from = from.collect::<Result<Vec<_>>>()?;
+    let [first, others @ ..] = &from[..] else { bail!("--from: name a run") };
+    let site = session.site.open(&mut session.settings)?;
+    let console = Session::open(System::Gleaner, session, None)?;
+    console.run(Refinement::open(session.settings.clone(), site, &session.out, first, others, *confidence)?)
+}
