@@ -1,10 +1,11 @@
-//! Judges the whole house end to end; what several of the tests in `tests/` need lies here.
+//! End-to-end tests of the whole workspace. This library holds what several files in `tests/` use.
 //!
 //! # Glossary
-//! - **judge**: a program that is not ours and says whether ours is right.
+//! - **judge**: a program by other authors that decides whether Gleaner's output is right.
 
 pub mod board;
 pub mod observations;
 pub mod programs;
 pub mod python;
+pub mod serving;
 pub mod sources;

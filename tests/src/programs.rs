@@ -1,18 +1,18 @@
-//! Our own programs as processes.
+//! Gleaner's own programs as processes.
 
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
-/// The program of this name, built by the same command as the test that asks.
+/// The program of this name, built by the same cargo command as the calling test.
 ///
 /// # Panics
-/// When it is not there, with the line to type.
+/// When it is not built, with the command to type.
 #[must_use]
 pub fn path(name: &str) -> PathBuf {
-    // Tests lie in the `deps` folder beside the programs.
+    // Tests are in the `deps` folder beside the programs.
     let test = std::env::current_exe().expect("a test knows where it is");
-    let folder = test.parent().and_then(|deps| deps.parent()).expect("tests lie two folders deep");
+    let folder = test.parent().and_then(|deps| deps.parent()).expect("tests are two folders deep");
     let program = folder.join(name);
     assert!(
         program.exists(),
@@ -38,7 +38,7 @@ pub struct Running {
 }
 
 impl Running {
-    /// Starts a program of ours; its standard error goes to the test's.
+    /// Starts a program; its standard error goes to the test's.
     ///
     /// # Panics
     /// When it cannot be started.
@@ -54,10 +54,16 @@ impl Running {
         Running { name: name.into(), child, lines, seen: Vec::new() }
     }
 
-    /// Reads standard output until a line begins with `prefix`; gives the rest of that line.
+    /// Its process id.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Reads standard output until a line begins with `prefix`; returns the rest of that line.
     ///
     /// # Panics
-    /// When the program ends before it says so.
+    /// When the program ends before that.
     pub fn line(&mut self, prefix: &str) -> String {
         for line in self.lines.by_ref() {
             let line = line.unwrap_or_default();
@@ -66,13 +72,13 @@ impl Running {
             }
             self.seen.push(line);
         }
-        panic!("{} ended without saying {prefix:?}; it said {:?}", self.name, self.seen);
+        panic!("{} ended before it printed {prefix:?}; it printed {:?}", self.name, self.seen);
     }
 }
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It may have ended by itself; then there is nothing to kill.
+        // Fails only when it has ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

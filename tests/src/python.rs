@@ -1,8 +1,7 @@
-//! Python, for the checks that only other people's programs can make.
+//! Python, for the judges by other authors.
 //!
-//! The programs live in a virtual environment in the build folder, made once from `tests/python/requirements.txt`
-//! and made anew when a version in that file is not the one installed. A machine without Python fails the test
-//! that asked: nothing is skipped.
+//! They are installed into a virtual environment in the build folder, made once from `tests/python/requirements.txt` and
+//! made again when an installed version differs. On a machine without Python the calling test fails; none is skipped.
 
 use anyhow::{Context, Result, bail};
 use std::ffi::OsStr;
@@ -16,7 +15,7 @@ pub fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("python")
 }
 
-/// Runs one of our scripts in the virtual environment; gives its standard output.
+/// Runs a script of `tests/python` in the virtual environment; returns its standard output.
 ///
 /// # Errors
 /// No environment (the message says what to type), or the script ended with another code than 0.
@@ -32,11 +31,11 @@ pub fn run<A: AsRef<OsStr>>(script: &str, arguments: impl IntoIterator<Item = A>
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// The Python of the virtual environment, which has everything in the requirements. Tests and processes may ask
-/// at the same time; one makes the environment, the others wait.
+/// The Python of the virtual environment, with everything in the requirements. Safe to call from several tests and
+/// processes at once: one makes the environment, the others wait.
 ///
 /// # Errors
-/// There is no `python3` on the PATH, or it cannot install: with the line that mends it.
+/// There is no `python3` on the PATH, or it cannot install: with the command to type.
 pub fn interpreter() -> Result<PathBuf> {
     let target = target_folder();
     fs::create_dir_all(&target)?;
@@ -52,13 +51,13 @@ pub fn interpreter() -> Result<PathBuf> {
     // Dropping the file releases the lock.
 }
 
-/// Where cargo builds; relative paths count from the workspace's folder.
+/// Cargo's target folder; a relative path starts at the workspace's folder.
 fn target_folder() -> PathBuf {
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
     workspace.join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// Whether exactly the pinned versions are installed, however they came there.
+/// Whether the pinned versions are installed.
 fn is_complete(python: &Path, requirements: &Path) -> bool {
     const COMPARE: &str = "
 import importlib.metadata, sys
@@ -79,7 +78,7 @@ for line in open(sys.argv[1]):
 
 fn make(environment: &Path, python: &Path, requirements: &Path) -> Result<()> {
     let advice = format!(
-        "python3 -m venv --clear {} && {} -m pip install -r {}",
+        "python3 -m venv --clear {} && {} -m pip install --no-deps -r {}",
         environment.display(),
         python.display(),
         requirements.display()
@@ -92,7 +91,7 @@ fn make(environment: &Path, python: &Path, requirements: &Path) -> Result<()> {
     })?;
     succeeded("python3 -m venv", &made, &advice)?;
     let installed = Command::new(python)
-        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"])
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "-r"])
         .arg(requirements)
         .output()
         .with_context(|| format!("cannot start {}: type: {advice}", python.display()))?;
