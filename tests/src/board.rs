@@ -1,8 +1,8 @@
-//! The board's image in an emulator, with the harness around it.
+//! The board's image in an emulator, connected to the simulator.
 //!
 //! # Glossary
-//! - **image**: the ELF file that is flashed; the emulator boots the very same one.
-//! - **lines**: the board's serial lines as connections on loopback, the emulator being the one that connects.
+//! - **image**: the ELF file that is flashed; the emulator boots the same file.
+//! - **lines**: the board's serial lines as loopback connections; the emulator connects.
 
 mod emulator;
 mod image;
@@ -19,10 +19,10 @@ use gleaner_ports::Port;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-/// Longer than an emulator takes to start on a busy machine.
+/// Longest time that an emulator may take to start.
 const CONNECT_LIMIT: Duration = Duration::from_secs(30);
 
-/// A board that has booted, and the harness's ends of its lines.
+/// A running board and the simulator's ends of its lines.
 pub struct Board {
     /// Autopilot and radio.
     pub wired: Wired,
@@ -34,7 +34,7 @@ impl Board {
     /// Boots the image.
     ///
     /// # Errors
-    /// There is no fit emulator (the message says what to install), or it does not connect.
+    /// No suitable emulator (the message says what to install), or it does not connect.
     pub fn boot(image: &Image, options: &Options<'_>) -> Result<Board> {
         let (link, link_at) = listen()?;
         let (radio, radio_at) = listen()?;
@@ -43,7 +43,7 @@ impl Board {
         let begun = Instant::now();
         while !wired.await_peer(Duration::from_millis(100))? {
             if begun.elapsed() > CONNECT_LIMIT || !emulator.is_running() {
-                bail!("the emulator does not connect; it said: {}", emulator.said());
+                bail!("the emulator does not connect; it printed: {}", emulator.said());
             }
         }
         Ok(Board { wired, emulator })

@@ -1,4 +1,4 @@
-//! Observations for engines to answer.
+//! Observations to evaluate engines with.
 
 use gleaner_host_trainer::env::flight::Flight;
 use gleaner_host_trainer::judge::evaluation::{Network, realizations, test_preferences};
@@ -11,8 +11,8 @@ use gleaner_world::{ScenarioKind, World};
 use rand::{Rng, RngExt};
 use std::sync::Arc;
 
-/// Drawn ones of every size: number i has i mod 13 devices. Numbers reach beyond what flights make, so that the
-/// clips are exercised; yields come in steps of 64 units, as everywhere, and the terminal may be beside.
+/// Random observations: number i has i mod 13 devices. Values exceed those of flights, so that clipping is exercised;
+/// yields are multiples of 64 units, as everywhere, and every other map marks the terminal.
 pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
     let mut number = |low: f32, high: f32| low + (high - low) * rng.random::<f32>();
     (0..count)
@@ -26,7 +26,7 @@ pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
                 [east, north, number(0.0, 8000.0), snr_db, reachable, vantage[0], vantage[1]]
             };
             let devices = (0..sample % (K_MAX + 1)).map(device).collect();
-            // South-west of the aircraft, in every other one.
+            // South-west of the aircraft.
             let mark = (sample % 2 == 0).then_some(LOCAL_MAP_CELLS / 2 - LOCAL_MAP_SIDE - 1);
             Tokens {
                 uav: [number(0.0, 80.0), number(0.0, 80.0), number(-800.0, 800.0), number(-600.0, 600.0)],
@@ -41,11 +41,11 @@ pub fn random(rng: &mut impl Rng, count: usize) -> Vec<Tokens> {
         .collect()
 }
 
-/// What an actor sees on its own missions, and what the guard allows there: both scenarios, 1 to 12 devices, all
-/// test preferences, until there are so many.
+/// Observations and action masks of missions that the actor flies: both scenarios, 1 to 12 devices, all test
+/// preferences, `count` of them.
 ///
 /// # Panics
-/// When the actor does not answer with numbers.
+/// When a logit of the actor is not finite.
 #[must_use]
 pub fn flown(actor: &[f32], count: usize) -> Vec<(Tokens, ActionMask)> {
     let world = Arc::new(World::default_world());
@@ -66,7 +66,7 @@ pub fn flown(actor: &[f32], count: usize) -> Vec<(Tokens, ActionMask)> {
             for ((flight, tokens), logits) in flights.iter_mut().zip(tokens).zip(logits) {
                 let mask = flight.mask();
                 seen.push((tokens, mask));
-                flight.step(mask.argmax(&logits).expect("the actor answers with numbers"));
+                flight.step(mask.argmax(&logits).expect("finite logits"));
             }
         }
         if seen.len() >= count {

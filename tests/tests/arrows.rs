@@ -1,4 +1,4 @@
-//! The house: who may depend on whom. Arrows point down the ranks, never sideways or up.
+//! Which crate may depend on which: only on crates of lower rank.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -23,7 +23,7 @@ const RANKS: [(&str, u8); 14] = [
     ("tests", 4),
 ];
 
-/// Every edge between members, as folders: (who depends, on whom). Tests' and benches' edges count too.
+/// Every dependency between members, as folders: (dependent, dependency). Those of tests and benches count too.
 fn edges() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let output = Command::new(env!("CARGO"))
@@ -61,12 +61,12 @@ fn edges() -> Vec<(String, String)> {
 }
 
 #[test]
-fn arrows_point_down() {
+fn dependencies_point_to_lower_ranks() {
     let rank = |folder: &str| RANKS.iter().find(|(known, _)| *known == folder).unwrap().1;
     let edges = edges();
-    assert!(edges.len() > 20, "the reading of the metadata is broken: {edges:?}");
+    assert!(edges.len() > 20, "cargo metadata was not understood: {edges:?}");
     let wrong: Vec<_> = edges.iter().filter(|(from, to)| rank(to) >= rank(from)).collect();
-    assert!(wrong.is_empty(), "sideways or up: {wrong:?}");
+    assert!(wrong.is_empty(), "dependencies on the same or a higher rank: {wrong:?}");
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn the_guard_does_not_know_that_learning_exists() {
 }
 
 #[test]
-fn trainer_simulator_and_aircraft_share_one_observation_builder_and_one_mask() {
+fn trainer_and_aircraft_share_observation_builder_and_mask() {
     let edges = edges();
     for (user, owner) in [
         ("host-trainer", "firmware/policy"),

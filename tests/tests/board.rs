@@ -1,4 +1,4 @@
-//! The image of the shipped board, booted in QEMU, flown by the harness over its own serial lines.
+//! The image of the shipped board in QEMU, flown by the simulator over the board's serial lines.
 //!
 //! Run it alone, after the programs are built, with
 //! `cargo test --release --workspace --test board -- --nocapture`.
@@ -26,7 +26,7 @@ const COMMAND_ACK: u32 = 77;
 /// `MAV_CMD_USER_2`: engage.
 const ENGAGE: u16 = 31011;
 
-/// The aircraft lives so many times as fast as the board. At six times, a busy machine let the board come too late.
+/// Aircraft seconds per second of board time. At 6 the board misses deadlines on a busy machine.
 const HASTE: f32 = 4.0;
 
 fn staged(kind: ScenarioKind, seed: u64, devices: usize, haste: f32) -> Staged {
@@ -39,7 +39,7 @@ fn out_and_back() -> Staged {
     staged(ScenarioKind::ReturnBase, 5, 6, HASTE)
 }
 
-/// Seconds of the board's clock in such a mission, as the aircraft counts them.
+/// Seconds of the board's clock as aircraft time.
 fn board_seconds(seconds: u64) -> Duration {
     after(seconds * HASTE as u64)
 }
@@ -70,14 +70,14 @@ fn assert_good(flown: &Flown) {
     assert!(figures.is_good(), "{:?} {:?}", figures.violations, flown.texts);
 }
 
-/// The frames of the pilot that came after this time.
+/// The pilot's frames after this time.
 fn since(flown: &Flown, message_id: u32, at: Instant) -> Vec<Heard> {
     let mut frames = heard(flown.simulation.journal(), PILOT, message_id);
     frames.retain(|heard| heard.at > at);
     frames
 }
 
-/// The engines of the host, on the very model that the board has.
+/// The host's engines with the board's model.
 struct Judge {
     tract: TractPolicy,
     blob: AlignedBytes,
@@ -90,7 +90,7 @@ impl Judge {
         Judge { tract: TractPolicy::load_checked(&onnx).unwrap(), blob }
     }
 
-    /// Makes every decision of the flight again, from what the radio reported and from what the pilot said of itself.
+    /// Repeats every decision of the flight from the radio's reports and the pilot's records; returns how many.
     fn judge(&mut self, flown: &Flown) -> usize {
         let mut workspace = Workspace::new();
         let mut native = NativePolicy::new(Model::read(self.blob.as_slice()).unwrap(), &mut workspace);
@@ -120,12 +120,12 @@ impl Judge {
 }
 
 #[test]
-fn a_board_flies_the_mission_and_decides_as_linux_does() {
+fn the_board_flies_the_mission_with_linux_decisions() {
     let image = image();
     let staged = staged(ScenarioKind::ReachDestination, 3, 12, HASTE);
     let image = image.with_mission(&staged.mission).unwrap();
     let mut board = boot(&image, &Options::default());
-    // The first change goes out as a command, the second as a parameter.
+    // The first change is a command, the second a parameter.
     let switches = vec![Switch { after: after(40), w_data: 0.5 }, Switch { after: after(80), w_data: 0.1 }];
     let wishes = Wishes { switches, ..Wishes::plain(1.0) };
     let flown = fly_wired(flight(staged, wishes), &mut board.wired, |_, _| None);
@@ -141,7 +141,7 @@ fn a_board_flies_the_mission_and_decides_as_linux_does() {
     assert!(figures.collected > 0.2, "{figures:?}");
 }
 
-/// xorshift64: noise that is the same every time.
+/// xorshift64: reproducible noise.
 struct Noise(u64);
 
 impl Noise {
@@ -156,7 +156,7 @@ impl Noise {
 }
 
 #[test]
-fn garbage_half_frames_and_a_flood_do_not_disturb_the_mission() {
+fn garbage_partial_frames_and_a_flood_do_no_harm() {
     let staged = out_and_back();
     let image = image().with_mission(&staged.mission).unwrap();
     let mut board = boot(&image, &Options::default());
@@ -167,11 +167,11 @@ fn garbage_half_frames_and_a_flood_do_not_disturb_the_mission() {
         let mut bytes = [0; 256];
         noise.fill(&mut bytes);
         match flight.operator().engaged_at() {
-            // Both lines full while nothing flies yet: 13 kB/s, all that the emulator carries.
+            // Both lines saturated before the flight: 13 kB/s, the emulator's limit.
             None if flight.simulation().now() < Instant::ZERO + after(12) => {
                 wired.disturb(&bytes[..64], &bytes[..64]);
             }
-            // In flight the autopilot still comes through, between halves of frames; the radio does not stop.
+            // In flight the autopilot's frames arrive between partial ones; radio noise continues.
             _ => wired.disturb(&half[..half.len() * usize::from(bytes[0] < 64)], &bytes[..16]),
         }
         None
@@ -185,7 +185,7 @@ fn garbage_half_frames_and_a_flood_do_not_disturb_the_mission() {
 }
 
 #[test]
-fn an_autopilot_that_reboots_in_flight_gets_no_more_targets() {
+fn an_autopilot_that_reboots_gets_no_more_targets() {
     let staged = out_and_back();
     let image = image().with_mission(&staged.mission).unwrap();
     let mut board = boot(&image, &Options::default());
@@ -194,8 +194,7 @@ fn an_autopilot_that_reboots_in_flight_gets_no_more_targets() {
     let mut flight = flight(staged, wishes);
     let mut pace = Pace::new(HASTE);
     let mut rebooted_at = None;
-    // On the ground and disarmed the flight is over; the pilot is watched for longer than the autopilot takes to be
-    // heard again, and to be known for another.
+    // After the landing the pilot is watched until the autopilot has been back for a while.
     while rebooted_at.is_none_or(|at| flight.simulation().now() < at + board_seconds(15)) {
         for _ in 0..pace.due() {
             flight.step(&mut board.wired);
@@ -212,22 +211,22 @@ fn an_autopilot_that_reboots_in_flight_gets_no_more_targets() {
     assert!(flown.figures().violations.is_empty(), "{:?}", flown.figures());
     let settled = rebooted_at + board_seconds(2);
     assert!(since(&flown, SET_POSITION_TARGET_LOCAL_NED, settled).is_empty(), "{:?}", flown.texts);
-    assert!(since(&flown, HEARTBEAT, settled).len() > 10, "the pilot is still there");
+    assert!(since(&flown, HEARTBEAT, settled).len() > 10, "the pilot still sends heartbeats");
 }
 
 #[test]
-fn reset_in_flight_it_falls_silent_and_does_not_engage_by_itself() {
+fn a_reset_in_flight_silences_the_board_and_does_not_engage() {
     let staged = out_and_back();
     let image = image().with_mission(&staged.mission).unwrap();
     let Board { mut wired, mut emulator } = boot(&image, &Options::default());
     let (mut hung_at, mut reset_at) = (None, None);
-    // For data alone it would fly for a long time. The operator asks again until it hears of a decision: the program
-    // hangs later than that, so that nothing of it is left on the line.
+    // The operator repeats the engage request until the first decision. The program hangs later than that, so that no
+    // request is left on the line.
     let flown = fly_wired(flight(staged, Wishes::plain(1.0)), &mut wired, |flight, _| {
         let now = flight.simulation().now();
         let engaged_at = flight.operator().engaged_at()?;
         if hung_at.is_none() && now > engaged_at + board_seconds(3) {
-            // After a second of the board's time without a decision loop the watchdog bites.
+            // The watchdog resets after a second of board time without the decision loop.
             emulator.freeze().unwrap();
             hung_at = Some(now);
         }
@@ -243,13 +242,13 @@ fn reset_in_flight_it_falls_silent_and_does_not_engage_by_itself() {
     let ours = |message_id| since(&flown, message_id, hung_at + after(1));
     assert!(ours(SET_POSITION_TARGET_LOCAL_NED).is_empty(), "{:?}", flown.texts);
     let heartbeats = ours(HEARTBEAT);
-    assert!(heartbeats.iter().all(|heartbeat| heartbeat.at > reset_at), "nothing while it hangs");
-    assert!(heartbeats.len() >= 8, "it comes back: {:?}", flown.texts);
+    assert!(heartbeats.iter().all(|heartbeat| heartbeat.at > reset_at), "no heartbeat while it hangs");
+    assert!(heartbeats.len() >= 8, "heartbeats after the reset: {:?}", flown.texts);
     assert!(said(&flown, "restarted in flight"), "{:?}", flown.texts);
     assert_eq!(flown.figures().violations, []);
 }
 
-/// Boots an image that must not fly; what it said until the operator had asked for ten seconds of the board's time.
+/// Boots an image that must not fly, and requests engaging for ten seconds of board time.
 fn refused(image: &Image, staged: Staged) -> Flown {
     let mut board = boot(image, &Options::default());
     let mut asked_at = None;
@@ -260,7 +259,7 @@ fn refused(image: &Image, staged: Staged) -> Flown {
         }
         asked_at.is_some_and(|at| now > at + board_seconds(10)).then_some(Ending::NeverEngaged)
     });
-    assert!(asked_at.is_some(), "it speaks and takes parameters: waited for {}", flown.waiting_for);
+    assert!(asked_at.is_some(), "it communicates and accepts parameters: waited for {}", flown.waiting_for);
     assert!(flown.simulation.journal().slots().is_empty());
     assert!(heard(flown.simulation.journal(), PILOT, SET_POSITION_TARGET_LOCAL_NED).is_empty());
     assert!(said(&flown, "will not engage"), "{:?}", flown.texts);
@@ -274,7 +273,7 @@ fn refused(image: &Image, staged: Staged) -> Flown {
 }
 
 #[test]
-fn a_damaged_model_says_so_and_never_engages() {
+fn a_damaged_model_is_reported_and_never_engages() {
     let staged = out_and_back();
     let image =
         image().with_mission(&staged.mission).unwrap().with_flipped_bit(Image::MODEL, 100_000).unwrap();
@@ -283,7 +282,7 @@ fn a_damaged_model_says_so_and_never_engages() {
 }
 
 #[test]
-fn a_damaged_mission_says_so_and_never_engages() {
+fn a_damaged_mission_is_reported_and_never_engages() {
     let staged = out_and_back();
     let image = image().with_mission(&staged.mission).unwrap().with_flipped_bit(Image::MISSION, 200).unwrap();
     let flown = refused(&image, staged);
@@ -291,7 +290,7 @@ fn a_damaged_mission_says_so_and_never_engages() {
 }
 
 #[test]
-fn damaged_parameters_leave_the_defaults_and_the_mission() {
+fn damaged_parameters_fall_back_to_the_defaults() {
     let staged = out_and_back();
     let image = image().with_mission(&staged.mission).unwrap();
     let mut noise = vec![0; image.parameters().unwrap().len()];

@@ -1,5 +1,5 @@
-//! What the shipped board's image takes: flash, RAM, stack, instructions, time. Measured, printed, and compared with
-//! the table in `tests/budget.toml`.
+//! Flash, RAM, stack, instructions and time of the shipped board's image: measured, printed, and compared with the
+//! table in `tests/budget.toml`.
 //!
 //! `cargo test --release --workspace --test budget -- --nocapture`
 
@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 const TABLE: &str = include_str!("../budget.toml");
 const CLOCK_MHZ: f64 = 168.0;
-/// Cycles per instruction of the Cortex-M4 in this engine: an estimate, since QEMU counts no cycles and nothing was timed
-/// on silicon. The kernel's step is 20 multiply-adds of 3 cycles, 9 loads of 2 and 3 others (Cortex-M4 TRM, tables 3-1
+/// Cycles per instruction of the Cortex-M4 in this engine. An estimate: QEMU counts no cycles, and no inference was timed
+/// on hardware. The kernel's step is 20 multiply-adds of 3 cycles, 9 loads of 2 and 3 others (Cortex-M4 TRM, tables 3-1
 /// and 7-1): 2.5 cycles per instruction in three quarters of them, 1.3 in the rest, and 7 % for weights that come from
 /// flash at five wait states (RM0090, table 10), a line of four at a time.
 const CYCLES_PER_INSTRUCTION: f64 = 2.4;
@@ -32,12 +32,12 @@ struct Line {
     unit: String,
     measured: u64,
     target: u64,
-    /// Why the target is not met, as long as it is not.
+    /// Why the target is not met; absent when it is met.
     missed: Option<String>,
 }
 
 impl Line {
-    /// What is wrong with the figure as it is now.
+    /// What is wrong with the present figure.
     fn fault(&self, now: u64, tolerance_percent: f64) -> Option<&'static str> {
         let most = (self.measured as f64 * (1.0 + tolerance_percent / 100.0)) as u64;
         match &self.missed {
@@ -49,7 +49,8 @@ impl Line {
     }
 }
 
-/// A short mission with as many devices as the model sees; the stack's depth and what an inference takes.
+/// Flies a short mission with as many devices as the model has tokens; returns stack use and instructions per
+/// inference.
 fn fly(image: &Image) -> (StackUse, u64) {
     let kind = ScenarioKind::ReturnBase;
     let plan = MissionPlan { devices: Some(12), haste: 4.0, ..MissionPlan::new(kind, 5) };
@@ -61,8 +62,9 @@ fn fly(image: &Image) -> (StackUse, u64) {
     let flown = fly_wired(flight, &mut board.wired, |_, _| None);
     assert_eq!(flown.ending, Ending::OnTheGround, "waited for {}: {:?}", flown.waiting_for, flown.texts);
     let times_us = named_values(flown.simulation.journal(), 191, "infer_us");
-    // The shortest: in the others an interrupt was served.
-    let shortest_us = times_us.iter().copied().reduce(f32::min).expect("the board tells how long it infers");
+    // The shortest one: interrupts lengthen the others.
+    let shortest_us =
+        times_us.iter().copied().reduce(f32::min).expect("the board reports its inference time");
     (board.emulator.stack_use().unwrap(), (shortest_us * 1000.0) as u64)
 }
 
@@ -94,7 +96,10 @@ fn the_image_keeps_to_its_budget() {
     let image = Image::build().unwrap_or_else(|cause| panic!("{cause:#}"));
     let table: Table = toml::from_str(TABLE).unwrap();
     let measured = measure(&image);
-    assert!(measured.keys().copied().eq(table.lines.keys().map(String::as_str)), "the table has other lines");
+    assert!(
+        measured.keys().copied().eq(table.lines.keys().map(String::as_str)),
+        "the table and the measurement have different lines"
+    );
     let mut report = String::new();
     let mut faults = Vec::new();
     for (name, line) in &table.lines {
@@ -118,7 +123,7 @@ fn the_image_keeps_to_its_budget() {
 fn there_is_no_heap_and_no_panic_in_the_image() {
     let image = Image::build().unwrap_or_else(|cause| panic!("{cause:#}"));
     let functions = image.functions();
-    assert!(functions.len() > 20, "the image has lost its symbols: {functions:?}");
+    assert!(functions.len() > 20, "the image has no symbols: {functions:?}");
     for word in ["__rust_alloc", "__rg_alloc", "malloc", "9panicking", "rust_begin_unwind"] {
         let found: Vec<&String> = functions.iter().filter(|name| name.contains(word)).collect();
         assert!(found.is_empty(), "{word}: {found:?}");

@@ -1,4 +1,4 @@
-//! What the shipped policy must do in the simulated city, through the program that people run.
+//! What the shipped policy must achieve in the simulated city, through the installed program.
 
 use gleaner_tests::programs;
 use serde_json::Value;
@@ -25,7 +25,7 @@ fn fly(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn the_object_has_the_contract_s_keys() {
+fn the_json_report_has_the_documented_keys() {
     let report = fly(&["--scenario", "rd", "--preference", "0.5", "--seed", "4", "--switch", "60:0"]);
     let mut keys: Vec<&str> = report.as_object().unwrap().keys().map(String::as_str).collect();
     keys.sort_unstable();
@@ -50,7 +50,7 @@ fn the_object_has_the_contract_s_keys() {
 }
 
 #[test]
-fn for_energy_alone_the_shortest_way_is_flown() {
+fn at_w_0_the_shortest_way_is_flown() {
     for seed in ["1", "2", "3"] {
         let direct = fly(&["--scenario", "rd", "--preference", "0", "--seed", seed]);
         assert_eq!((&direct["energy"], &direct["decisions"]), (&32.0.into(), &32.into()), "{direct}");
@@ -61,7 +61,7 @@ fn for_energy_alone_the_shortest_way_is_flown() {
 
 /// The mean of 20 seeds, flown through MAVLink, against GREEDY on the same realizations on the grid.
 #[test]
-fn for_data_alone_more_is_collected_than_greedy_does() {
+fn at_w_1_the_policy_collects_more_than_greedy() {
     for scenario in ["rd", "rb"] {
         let mut sum = 0.0;
         for seed in 0..SEEDS {

@@ -1,4 +1,4 @@
-//! The file of the native engine: anything that is not exactly one is refused, with the reason.
+//! The native engine's file: anything else is refused with the reason.
 
 use gleaner_policy::native::{AlignedBytes, BlobError, Model, NativePolicy, WeightFormat, Workspace};
 use gleaner_policy::onnx::convert;
@@ -7,7 +7,7 @@ use gleaner_tests::programs::repository;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Where things stand in the header.
+/// Offsets in the header.
 const FORMAT: usize = 8;
 const LENGTH: usize = 12;
 const SCHEMA: usize = 16;
@@ -34,14 +34,14 @@ fn refusal(bytes: &[u8]) -> BlobError {
     }
 }
 
-/// CRC-32 (ISO-HDLC), bit by bit: not the code under test.
+/// CRC-32 (ISO-HDLC), bit by bit: independent of the code under test.
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
     })
 }
 
-/// Puts length and checksum right.
+/// Corrects length and checksum.
 fn reseal(mut bytes: Vec<u8>) -> Vec<u8> {
     let length = bytes.len() as u32;
     bytes[LENGTH..LENGTH + 4].copy_from_slice(&length.to_le_bytes());
@@ -51,7 +51,7 @@ fn reseal(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// The file with other bytes in one place, sealed again: what a wrong writer would make, not what damage makes.
+/// The file with some bytes replaced and sealed again, as a faulty writer would produce it.
 fn with(at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut file = blob(WeightFormat::I16);
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -59,7 +59,7 @@ fn with(at: usize, bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn a_file_that_was_cut_off_is_refused_wherever_it_was_cut() {
+fn a_truncated_file_is_refused() {
     for format in WeightFormat::ALL {
         let whole = AlignedBytes::new(&blob(format));
         let whole = whole.as_slice();
@@ -71,7 +71,7 @@ fn a_file_that_was_cut_off_is_refused_wherever_it_was_cut() {
                 Ok(_) => panic!("cut to {length} bytes it was read"),
             }
         }
-        // Cut by a writer who seals what is left.
+        // Truncated and sealed again.
         for length in (HEADER + 4..whole.len()).step_by(4096) {
             assert!(matches!(refusal(&reseal(whole[..length].to_vec())), BlobError::Length { .. }));
         }
@@ -82,7 +82,7 @@ fn a_file_that_was_cut_off_is_refused_wherever_it_was_cut() {
 }
 
 #[test]
-fn a_changed_byte_is_found_wherever_it_lies() {
+fn every_changed_byte_is_found() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let good = blob(WeightFormat::I16);
     let anywhere: Vec<usize> = (0..1500).map(|_| rng.random_range(HEADER..good.len())).collect();
@@ -101,7 +101,7 @@ fn a_changed_byte_is_found_wherever_it_lies() {
 }
 
 #[test]
-fn another_contract_is_refused_with_a_line_that_says_so() {
+fn another_schema_is_refused_with_advice() {
     let schema = schema::hash() ^ 1;
     let found = refusal(&with(SCHEMA, &schema.to_le_bytes()));
     assert_eq!(found, BlobError::Schema { model: schema, program: schema::hash() });
@@ -136,13 +136,13 @@ fn noise_is_refused() {
         let length = rng.random_range(0..3000);
         let noise: Vec<u8> = (0..length).map(|_| rng.random()).collect();
         refusal(&noise);
-        // Behind an honest header, sealed.
+        // Noise behind a valid header, sealed.
         refusal(&reseal([header, &noise, &[0; 4]].concat()));
     }
 }
 
 #[test]
-fn a_model_that_fails_its_own_example_does_not_engage() {
+fn a_model_that_fails_its_golden_pair_is_refused() {
     // The last number before the checksum is a weight of padding; the head's bias of `hover` is not.
     let good = blob(WeightFormat::F32);
     let mut changed = good.clone();
@@ -161,7 +161,7 @@ fn a_model_that_fails_its_own_example_does_not_engage() {
 }
 
 #[test]
-fn each_engine_says_what_it_takes() {
+fn each_engine_names_the_file_it_needs() {
     let engine = Engine::load_checked(&onnx(), EngineKind::Native).expect("converted in memory");
     let own = Engine::load_checked(&blob(WeightFormat::F32), EngineKind::Native).expect("its own file");
     let tract = Engine::load_checked(&onnx(), EngineKind::Tract).expect("the ONNX file");

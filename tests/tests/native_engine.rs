@@ -23,7 +23,7 @@ fn blob(format: WeightFormat) -> AlignedBytes {
     AlignedBytes::new(&convert(&shipped("gleaner.onnx"), format).expect("a model that can be converted"))
 }
 
-/// Lets `ask` use the engine with the shipped model.
+/// Calls `ask` with the engine and the shipped model.
 fn with_native<T>(format: WeightFormat, ask: impl FnOnce(&mut NativePolicy<'_>) -> T) -> T {
     let blob = blob(format);
     let mut workspace = Workspace::new();
@@ -31,7 +31,7 @@ fn with_native<T>(format: WeightFormat, ask: impl FnOnce(&mut NativePolicy<'_>) 
     ask(&mut NativePolicy::new(model, &mut workspace))
 }
 
-/// How far two engines are apart.
+/// The difference between two engines.
 #[derive(Clone, Copy, Debug, Default)]
 struct Apart {
     logits: f32,
@@ -61,7 +61,7 @@ impl Apart {
     }
 }
 
-/// Asks both engines, on every processor.
+/// Compares both engines, on all processors.
 fn compare(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apart {
     let threads = thread::available_parallelism().map_or(1, usize::from);
     thread::scope(|scope| {
@@ -83,7 +83,7 @@ fn compare_here(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apa
     })
 }
 
-/// ONNX is the only source: what is flashed is made from what was trained.
+/// The flashed model is a conversion of the trained one.
 #[test]
 fn the_committed_blob_is_the_conversion_of_the_committed_model() {
     assert!(
@@ -94,7 +94,7 @@ fn the_committed_blob_is_the_conversion_of_the_committed_model() {
 }
 
 #[test]
-fn on_random_observations_both_engines_decide_alike() {
+fn engines_agree_on_random_observations() {
     let mut rng = ChaCha8Rng::seed_from_u64(404);
     let observations = random(&mut rng, RANDOM);
     let mut mask = || ActionMask::from_bits(rng.random_range(1..32));
@@ -106,7 +106,7 @@ fn on_random_observations_both_engines_decide_alike() {
 }
 
 #[test]
-fn on_flown_observations_both_engines_decide_alike() {
+fn engines_agree_on_flown_observations() {
     let actor = read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights");
     let questions = flown(&actor, FLOWN);
     let apart = compare(WeightFormat::F32, &questions);
@@ -117,7 +117,7 @@ fn on_flown_observations_both_engines_decide_alike() {
 
 /// Half the flash for less than one decision in a thousand.
 #[test]
-fn with_16_bits_the_same_is_decided_nearly_always() {
+fn weights_of_16_bits_change_few_decisions() {
     let actor = read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights");
     let apart = compare(WeightFormat::I16, &flown(&actor, FLOWN));
     println!("{FLOWN} flown observations, 16 bits: {apart:?}");
@@ -125,7 +125,7 @@ fn with_16_bits_the_same_is_decided_nearly_always() {
 }
 
 #[test]
-fn the_order_of_the_devices_means_nothing() {
+fn the_order_of_the_devices_does_not_matter() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let observations = random(&mut rng, 20 * (K_MAX + 1));
     with_native(WeightFormat::F32, |native| {
@@ -146,8 +146,8 @@ fn the_order_of_the_devices_means_nothing() {
             }
             let mut apart = Apart::default();
             apart.add(&a, &b, ActionMask::FULL);
-            // Sums of another order, through all layers. Drawn maps are bright everywhere, so the numbers inside are
-            // larger than the logits.
+            // Another summation order through all layers. Random maps have large values everywhere, so intermediate
+            // values exceed the logits.
             let largest = a.logits.iter().fold(1.0_f32, |largest, logit| largest.max(logit.abs()));
             assert!(
                 apart.logits < 4e-6 * largest && apart.attention < 2e-5,
@@ -157,9 +157,9 @@ fn the_order_of_the_devices_means_nothing() {
     });
 }
 
-/// Lanes of absent devices hold what an earlier observation left there; nobody may see it.
+/// Lanes of absent devices hold values of an earlier observation, which must not matter.
 #[test]
-fn absent_devices_and_earlier_questions_leave_no_trace() {
+fn earlier_observations_leave_no_trace() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let observations = random(&mut rng, 4 * (K_MAX + 1));
     let mut full = observations[K_MAX].clone();
@@ -172,7 +172,7 @@ fn absent_devices_and_earlier_questions_leave_no_trace() {
             let fresh = with_native(format, |native| native.infer(tokens).unwrap());
             let used = with_native(format, |native| {
                 native.infer(&full).unwrap();
-                assert!(native.infer(&endless).is_err(), "an endless battery has no answer");
+                assert!(native.infer(&endless).is_err(), "an infinite battery is refused");
                 native.infer(tokens).unwrap()
             });
             assert_eq!(fresh, used, "to the last bit, {} devices", tokens.devices.len());

@@ -1,4 +1,4 @@
-//! The native engine through the programs that people run.
+//! The native engine through the programs.
 
 use gleaner_tests::programs::{path, repository};
 use serde_json::Value;
@@ -16,7 +16,7 @@ fn stdout(output: &Output) -> String {
 }
 
 #[test]
-fn convert_writes_the_committed_file_and_half_of_it() {
+fn convert_writes_the_committed_file_or_half_its_size() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("model.gln");
     let convert = |weights| {
@@ -33,7 +33,7 @@ fn convert_writes_the_committed_file_and_half_of_it() {
 }
 
 #[test]
-fn what_cannot_be_converted_is_said_in_one_line() {
+fn conversion_errors_are_one_line() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("model.gln");
     let out = out.to_str().unwrap();

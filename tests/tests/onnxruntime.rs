@@ -1,5 +1,4 @@
-//! One model file, three engines, one answer: the trainer's forward pass, tract, and onnxruntime as the judge
-//! that none of us wrote.
+//! One model file, three engines, one result: the trainer's forward pass, tract, and onnxruntime as the judge.
 
 use gleaner_host_trainer::export::{ModelCard, export, golden_pairs, read_actor};
 use gleaner_host_trainer::net::{Batch, Shape, Workspace, forward};
@@ -12,9 +11,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 
-/// The largest difference that is rounding.
+/// Largest difference due to rounding.
 const TOLERANCE: f32 = 1e-4;
-/// Observations that each network is asked about.
+/// Observations per network.
 const OBSERVATIONS: usize = 256;
 
 fn ask_trainer(actor: &[f32], observations: &[Tokens]) -> Vec<Inference> {
@@ -34,7 +33,7 @@ fn ask_tract(file: &[u8], observations: &[Tokens]) -> Vec<Inference> {
     observations.iter().map(|tokens| policy.infer(tokens).expect("an answer")).collect()
 }
 
-/// All observations as one batch; the rows of absent devices hold garbage, which must not matter.
+/// Evaluates all observations as one batch. The rows of absent devices hold garbage, which must not matter.
 fn ask_onnxruntime(file: &[u8], observations: &[Tokens]) -> Vec<Inference> {
     let folder = tempfile::tempdir().expect("a folder");
     for port in &INPUTS {
@@ -112,7 +111,7 @@ fn assert_attention_is_masked(engine: &str, answers: &[Inference], observations:
     }
 }
 
-/// Asks all engines and compares each with the trainer.
+/// Evaluates all engines and compares each with the trainer.
 fn assert_all_agree(what: &str, file: &[u8], actor: &[f32]) {
     let observations = random(&mut ChaCha8Rng::seed_from_u64(11), OBSERVATIONS);
     let trainer = ask_trainer(actor, &observations);
@@ -129,8 +128,8 @@ fn assert_all_agree(what: &str, file: &[u8], actor: &[f32]) {
 }
 
 #[test]
-fn fresh_networks_answer_alike_in_every_engine() {
-    // As drawn, attention is nearly even; sharpened, it is not.
+fn initial_networks_agree_in_every_engine() {
+    // Initial weights give nearly uniform attention; scaled ones do not.
     for (what, sharpness) in [("as drawn", 1.0), ("sharpened", 2.5)] {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut actor = Shape::actor().initialise(&mut rng);
@@ -144,7 +143,7 @@ fn fresh_networks_answer_alike_in_every_engine() {
 }
 
 #[test]
-fn shipped_models_answer_alike_in_every_engine() {
+fn shipped_models_agree_in_every_engine() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models");
     let entries = std::fs::read_dir(&folder).expect("the folder models/ is there");
     let mut models: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();

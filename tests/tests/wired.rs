@@ -1,7 +1,6 @@
-//! `gleaner-sitl fly --board`: the whole mission with a pilot that is not in the harness's process.
+//! `gleaner-sitl fly --board`: a whole mission with a pilot in another process.
 //!
-//! The pilot is the Linux program `gleaner` on two sockets. A board behind an emulator stands in the same place, see
-//! `board.rs`; what fails here is not the board's fault.
+//! The pilot is the Linux program `gleaner` on two sockets. `board.rs` does the same with the emulated board.
 
 use gleaner_tests::programs::{self, Running, repository};
 use serde_json::Value;
@@ -9,12 +8,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// A mission of RB for energy alone is two decisions; ten times as fast it takes a quarter of a minute.
+/// An RB mission at w = 0 has two decisions; at ten times real time it takes 15 s.
 const QUICK: [&str; 8] = ["--scenario", "rb", "--seed", "5", "--preference", "0", "--haste", "8"];
 
 struct Flight {
     report: Value,
-    /// What the harness and the pilot say of each decision.
+    /// Decision records of the simulator and of the pilot.
     decisions: [Vec<Value>; 2],
 }
 
@@ -31,7 +30,7 @@ fn fly(arguments: &[&str], has_radio: bool) -> Flight {
     let connect = |endpoint: String| endpoint.replace("tcpin:", "tcpout:");
     let autopilot = connect(city.line("autopilot"));
     let radio = has_radio.then(|| connect(city.line("radio")));
-    // The mission is named last: its file is there.
+    // The mission is announced last, after its file is written.
     city.line("mission");
     let model = repository().join("models/gleaner.onnx");
     let mut words = vec!["run", "--autopilot", &autopilot, "--mission", &mission, "--log", &log];
@@ -77,19 +76,19 @@ fn check(flight: &Flight, decisions: usize, devices: usize) {
         }
         let heard = made["tokens"]["devices"].as_array().unwrap();
         assert_eq!(heard.len(), devices);
-        // The radio was heard: these are no SNRs of silence.
+        // Reports arrived: no SNR has the value of an absent one.
         assert!(heard.iter().all(|device| device[3].as_f64().unwrap() > -30.0), "{made}");
     }
 }
 
 #[test]
-fn a_pilot_on_two_lines_flies_the_mission_to_the_terminal() {
+fn a_pilot_on_two_lines_reaches_the_terminal() {
     let flight = fly(&QUICK, true);
     check(&flight, 2, 6);
     assert_eq!(flight.report["energy"], 2.0);
 }
 
 #[test]
-fn without_a_line_of_its_own_the_radio_reports_by_tunnel() {
+fn radio_reports_also_arrive_by_tunnel() {
     check(&fly(&QUICK, false), 2, 6);
 }

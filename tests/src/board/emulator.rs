@@ -1,4 +1,4 @@
-//! QEMU as the board: its serial lines on loopback, its memory to look at, its reset button.
+//! QEMU as the board: serial lines on loopback, memory access, reset.
 
 use super::image::Image;
 use anyhow::{Context, Result, bail, ensure};
@@ -14,35 +14,35 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 const PROGRAM: &str = "qemu-system-arm";
-/// The first whose STM32F405 keeps what is written into the clock control; before, the program believes in the slow
-/// clock, and its time runs ten times too fast.
+/// The first version whose STM32F405 stores what is written to the clock control. With older ones the program runs on
+/// the slow clock and its time is ten times too fast.
 const OLDEST: u32 = 10;
 /// A board with that chip, its UARTs in order: 1, 2 (autopilot), 3 (radio), 4 (log).
 const MACHINE: &str = "olimex-stm32-h405";
-/// What the stack is filled with before the start.
+/// The stack's contents before the start.
 pub const STACK_PAINT: u8 = 0xC5;
-/// Longer than the emulator takes to answer on a busy machine.
+/// Longest time for an answer of the emulator.
 const ANSWER_LIMIT: Duration = Duration::from_secs(20);
 
-/// How to boot.
+/// Boot options.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options<'o> {
-    /// What the parameters' flash holds; erased otherwise.
+    /// Contents of the parameters' flash; erased otherwise.
     pub parameters: Option<&'o [u8]>,
-    /// One nanosecond of the board's time per instruction, so that its clock counts instructions. It is slower.
+    /// One nanosecond of board time per instruction, so that its clock counts instructions. Slower.
     pub count_instructions: bool,
 }
 
-/// How deep the stack has been.
+/// Stack use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StackUse {
-    /// Bytes that were written.
+    /// Bytes used at the deepest point.
     pub used: u32,
-    /// Bytes that there are.
+    /// Size in bytes.
     pub room: u32,
 }
 
-/// A running emulator; it ends when it is dropped.
+/// A running emulator. Dropping it ends the process.
 pub struct Emulator {
     child: Child,
     monitor: BufReader<UnixStream>,
@@ -71,7 +71,7 @@ impl Emulator {
         };
         let mut command = Command::new(PROGRAM);
         command
-            // The machine has its own memory; without this, QEMU believes that there is none to load files into.
+            // Without this, QEMU has no memory to load files into.
             .args(["-M", MACHINE, "-m", "64M", "-display", "none", "-monitor", "none", "-kernel"])
             .arg(at("board.elf"))
             .args(["-device", &load("paint.bin", &stack), "-device", &load("parameters.bin", &parameters)])
@@ -89,7 +89,7 @@ impl Emulator {
             Err(error) => {
                 let _ = child.kill();
                 let _ = child.wait();
-                bail!("{error}; it said: {}", fs::read_to_string(at("said")).unwrap_or_default());
+                bail!("{error}; it printed: {}", fs::read_to_string(at("said")).unwrap_or_default());
             }
         };
         let mut emulator = Emulator { child, monitor, folder, stack };
@@ -97,18 +97,18 @@ impl Emulator {
         Ok(emulator)
     }
 
-    /// Whether it still runs.
+    /// Whether it is still running.
     pub fn is_running(&mut self) -> bool {
         self.child.try_wait().is_ok_and(|ended| ended.is_none())
     }
 
-    /// What it said on its standard error.
+    /// Its standard error so far.
     #[must_use]
     pub fn said(&self) -> String {
         fs::read_to_string(self.folder.path().join("said")).unwrap_or_default()
     }
 
-    /// Presses the reset button.
+    /// Resets the board.
     ///
     /// # Errors
     /// The emulator does not answer.
@@ -116,7 +116,7 @@ impl Emulator {
         self.ask("system_reset", &json!({})).map(drop)
     }
 
-    /// Stops the processor, its clock and its timers: a program that hangs.
+    /// Stops the processor, its clock and its timers, like a program that hangs.
     ///
     /// # Errors
     /// The emulator does not answer.
@@ -132,7 +132,7 @@ impl Emulator {
         self.ask("cont", &json!({})).map(drop)
     }
 
-    /// What the memory holds now.
+    /// The present contents of memory.
     ///
     /// # Errors
     /// The emulator does not answer.
@@ -142,14 +142,14 @@ impl Emulator {
         Ok(fs::read(&file)?)
     }
 
-    /// How deep the stack has been since the start.
+    /// Stack use since the start.
     ///
     /// # Errors
-    /// The emulator does not answer, or its memory was not painted.
+    /// The emulator does not answer, or the stack was not filled before the start.
     pub fn stack_use(&mut self) -> Result<StackUse> {
         let stack = self.memory(self.stack.clone())?;
         let untouched = stack.iter().take_while(|&&byte| byte == STACK_PAINT).count();
-        ensure!(untouched > 0, "the stack has used all of its room");
+        ensure!(untouched > 0, "the stack is full");
         let room = stack.len() as u32;
         Ok(StackUse { used: room - untouched as u32, room })
     }
@@ -166,7 +166,7 @@ impl Emulator {
             if let Some(fault) = answer.get("error") {
                 bail!("{PROGRAM}: {command}: {fault}");
             }
-            // Events come in between.
+            // Events may arrive before the answer.
             if answer.get("return").is_some() {
                 return Ok(answer["return"].take());
             }
@@ -176,7 +176,7 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // It may have ended by itself; then there is nothing to kill.
+        // Fails only when it has ended by itself.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -203,7 +203,7 @@ fn check_version() -> Result<()> {
         "install {PROGRAM} {OLDEST} or newer (Debian 12: from bookworm-backports), or type bash .ci/run"
     );
     let output = Command::new(PROGRAM).arg("--version").output();
-    let output = output.with_context(|| format!("there is no {PROGRAM}: {advice}"))?;
+    let output = output.with_context(|| format!("{PROGRAM} is missing: {advice}"))?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let number = text.split("version ").nth(1).and_then(|rest| rest.split('.').next());
     let major: u32 = number.and_then(|number| number.parse().ok()).unwrap_or(0);

@@ -1,4 +1,4 @@
-//! The image: what is in it, and altered copies of it.
+//! The board's image: its sections and symbols, and modified copies.
 
 use super::toolchain;
 use anyhow::{Context, Result, ensure};
@@ -13,18 +13,18 @@ pub struct Image {
     bytes: Vec<u8>,
 }
 
-/// One section that takes room on the board.
+/// A section that occupies memory on the board.
 #[derive(Clone, Debug)]
 pub struct Section {
     /// Its name.
     pub name: String,
-    /// Where it lies when the program runs.
+    /// Its address at run time.
     pub address: u32,
     /// Bytes.
     pub size: u32,
-    /// Whether it stands in flash: everything but memory that is cleared at the start.
+    /// Whether it is in flash: everything except memory that startup code clears.
     pub in_flash: bool,
-    /// Whether it takes RAM.
+    /// Whether it occupies RAM.
     pub in_ram: bool,
 }
 
@@ -34,7 +34,7 @@ impl Image {
     /// The model's section.
     pub const MODEL: &str = ".gleaner_model";
 
-    /// The image of the shipped board, as the sources are now.
+    /// Builds the shipped board's image from the present sources.
     ///
     /// # Errors
     /// It cannot be built, with what to do about it.
@@ -45,7 +45,7 @@ impl Image {
     /// The image in this file.
     ///
     /// # Errors
-    /// It cannot be read, or is none.
+    /// The file cannot be read or is not an ELF file.
     pub fn read(path: &Path) -> Result<Image> {
         let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
         object::File::parse(&*bytes).with_context(|| path.display().to_string())?;
@@ -62,7 +62,7 @@ impl Image {
         object::File::parse(&*self.bytes).expect("parsed when it was read")
     }
 
-    /// The sections that take room on the board.
+    /// The sections that occupy memory on the board.
     #[must_use]
     pub fn sections(&self) -> Vec<Section> {
         let file = self.file();
@@ -79,8 +79,8 @@ impl Image {
                 address,
                 size: section.size() as u32,
                 in_flash: !cleared,
-                // Flash begins at 0x0800_0000 and all RAM of the chip's kind lies above or, tightly coupled, at
-                // 0x1000_0000 (RM0090, table 1).
+                // Flash starts at 0x0800_0000; all RAM is above it, the core-coupled RAM at 0x1000_0000 (RM0090,
+                // table 1).
                 in_ram: address >= 0x1000_0000,
             });
         }
@@ -95,7 +95,7 @@ impl Image {
         Some(found.address() as u32)
     }
 
-    /// The names of all functions that are left in the image.
+    /// The names of all functions in the image.
     #[must_use]
     pub fn functions(&self) -> Vec<String> {
         let file = self.file();
@@ -106,35 +106,35 @@ impl Image {
     /// The bytes of a section.
     ///
     /// # Errors
-    /// There is none of this name.
+    /// No section has this name.
     pub fn section(&self, name: &str) -> Result<&[u8]> {
         Ok(&self.bytes[self.place(name)?])
     }
 
-    /// Where the stack may grow, from its lowest address to its start.
+    /// The stack's range, from its lowest address to its start.
     ///
     /// # Errors
-    /// The image does not say.
+    /// The image lacks the symbols.
     pub fn stack(&self) -> Result<Range<u32>> {
         let symbol =
             |name: &str| self.symbol(name).with_context(|| format!("the image has no symbol {name}"));
         Ok(symbol("_stack_end")?..symbol("_stack_start")?)
     }
 
-    /// Where the parameters lie in flash.
+    /// The parameters' range in flash.
     ///
     /// # Errors
-    /// The image does not say.
+    /// The image lacks the symbols.
     pub fn parameters(&self) -> Result<Range<u32>> {
         let symbol =
             |name: &str| self.symbol(name).with_context(|| format!("the image has no symbol {name}"));
         Ok(symbol("_parameters_start")?..symbol("_parameters_end")?)
     }
 
-    /// A copy with another mission in it, as it is flashed apart from the program.
+    /// A copy with another mission.
     ///
     /// # Errors
-    /// The image has no room for one.
+    /// The mission does not fit.
     pub fn with_mission(&self, mission: &Mission) -> Result<Image> {
         let mut copy = self.clone();
         let place = copy.place(Image::MISSION)?;
@@ -144,10 +144,10 @@ impl Image {
         Ok(copy)
     }
 
-    /// A copy in which one bit of a section is another.
+    /// A copy with one bit of a section inverted.
     ///
     /// # Errors
-    /// There is no such section, or it is shorter.
+    /// No section has this name, or it is shorter.
     pub fn with_flipped_bit(&self, section: &str, offset: usize) -> Result<Image> {
         let mut copy = self.clone();
         let place = copy.place(section)?;

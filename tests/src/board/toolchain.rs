@@ -1,4 +1,4 @@
-//! Building the image: with rustup's toolchain, or with the one that a system ships.
+//! Builds the image with rustup's toolchain, or with the system's.
 
 use crate::programs::repository;
 use anyhow::{Context, Result, bail};
@@ -10,11 +10,11 @@ use std::process::Command;
 const TARGET: &str = "thumbv7em-none-eabihf";
 const PROGRAM: &str = "gleaner-f405";
 
-/// Builds the image of the shipped board; where it is. Tests and processes may ask at the same time; one builds, the
-/// others wait. Its build folder is its own, so it never waits for the cargo that runs the tests.
+/// Builds the image of the shipped board; returns its path. Safe to call from several tests and processes at once: one
+/// builds, the others wait. It has a build folder of its own, so it never waits for the cargo that runs the tests.
 ///
 /// # Errors
-/// There is no core library for the board (the message says what to type), or the image does not build.
+/// The core library for the board is missing (the message says what to type), or the image does not build.
 pub(super) fn build() -> Result<PathBuf> {
     let target_folder = repository().join("target/board");
     fs::create_dir_all(&target_folder)?;

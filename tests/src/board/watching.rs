@@ -1,4 +1,4 @@
-//! What passed by on the wires of a flight, for tests to look at.
+//! Frames on the lines of a flight.
 
 use gleaner_harness::Journal;
 use gleaner_link::{Frame, FrameDecoder};
@@ -7,12 +7,12 @@ use gleaner_units::Instant;
 /// `NAMED_VALUE_FLOAT`.
 const NAMED_VALUE_FLOAT: u32 = 251;
 
-/// One frame and when it passed, since the autopilot's first boot.
+/// One frame and its time since the autopilot's first boot.
 #[derive(Debug)]
 pub struct Heard {
-    /// When.
+    /// Time.
     pub at: Instant,
-    /// What.
+    /// The frame.
     pub frame: Frame,
 }
 
@@ -22,7 +22,7 @@ pub fn heard(journal: &Journal, component: u8, message_id: u32) -> Vec<Heard> {
     let mut found = Vec::new();
     for (at, bytes) in journal.frames() {
         let mut decoder = FrameDecoder::new();
-        // One frame: the decoder takes all of it.
+        // One frame: the decoder accepts all of it.
         let _ = decoder.push(bytes);
         let frame = decoder.next_frame();
         let wanted = |frame: &Frame| frame.sender.component == component && frame.message_id == message_id;
@@ -31,15 +31,15 @@ pub fn heard(journal: &Journal, component: u8, message_id: u32) -> Vec<Heard> {
     found
 }
 
-/// The values that a component has told under this name.
+/// The values that a component has sent under this name.
 #[must_use]
 pub fn named_values(journal: &Journal, component: u8, name: &str) -> Vec<f32> {
     let frames = heard(journal, component, NAMED_VALUE_FLOAT);
     let value = |heard: &Heard| {
         // Time, value, name of 10 characters; trailing zeros do not travel.
         let mut payload = [0; 18];
-        let told = heard.frame.payload();
-        payload.get_mut(..told.len())?.copy_from_slice(told);
+        let payload_sent = heard.frame.payload();
+        payload.get_mut(..payload_sent.len())?.copy_from_slice(payload_sent);
         let text = payload[8..].split(|&byte| byte == 0).next()?;
         (text == name.as_bytes())
             .then(|| f32::from_le_bytes([payload[4], payload[5], payload[6], payload[7]]))
