@@ -142,7 +142,7 @@ fn every_command_names_a_real_program_and_real_flags() {
             checked += 1;
         }
     }
-    assert!(checked >= 30, "only {checked} commands were found: the reading is broken");
+    assert!(checked >= 25, "only {checked} commands were found: the reading is broken");
 }
 
 #[test]
