@@ -47,6 +47,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             sent += length;
         }
     }
-    println!("{} after 20 s: state {}, {sent} bytes for the autopilot", env!("CARGO_PKG_NAME"), pilot.state().name());
+    println!(
+        "{} after 20 s: state {}, {sent} bytes for the autopilot",
+        env!("CARGO_PKG_NAME"),
+        pilot.state().name()
+    );
     Ok(())
 }

@@ -34,8 +34,8 @@ fn main() {
         println!("{:<6} {:8.3}", action.name(), inference.logits[action.index()]);
     }
     // In flight, `firmware/guard` masks the logits before the largest one wins.
-    let best = Action::ALL.into_iter().max_by(|a, b| {
-        inference.logits[a.index()].total_cmp(&inference.logits[b.index()])
-    });
+    let best = Action::ALL
+        .into_iter()
+        .max_by(|a, b| inference.logits[a.index()].total_cmp(&inference.logits[b.index()]));
     println!("decision: {}", best.expect("five actions").name());
 }
