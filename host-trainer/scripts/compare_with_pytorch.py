@@ -1,10 +1,9 @@
-"""Times the same update here and in PyTorch's eager mode, in turn, on one core, and prints the ratio.
+"""Compares the time of one update with PyTorch's eager mode, on one core, and prints the ratio.
 
     python3 host-trainer/scripts/compare_with_pytorch.py [--python PYTHON_WITH_TORCH] [--rounds 5]
 
-Rounds alternate so that other work on the machine hits both alike. Times are the processor's time of one thread
-(milliseconds an update, least within a round); the ratio is the median over the rounds, with its range. Needs cargo
-and a Python with torch; installs nothing.
+Rounds alternate, so that other load affects both equally. Times are CPU milliseconds per update of one thread, the
+minimum of a round; the ratio is the median over the rounds, with its range. Needs cargo and a Python with torch.
 """
 
 import argparse
@@ -44,7 +43,7 @@ def main():
     arguments = parser.parse_args()
     ours = [build()]
     torch = [arguments.python, str(HERE / "pytorch_update_bench.py"), "6"]
-    # Both on one core, the last that this process may use.
+    # Both run on one core, the last of those that this process may use.
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     pairs = [(cpu_ms(ours), cpu_ms(torch)) for _ in range(arguments.rounds)]
     ratios = sorted(theirs / mine for mine, theirs in pairs)

@@ -1,13 +1,13 @@
-"""Freezes what PyTorch makes of the network, for `tests/pytorch_fixture.rs`.
+"""Writes the results of the network in PyTorch, for `tests/pytorch_fixture.rs`.
 
     python3 host-trainer/scripts/pytorch_fixture.py
 
-Needs torch and installs nothing; the committed fixture was written by torch 2.15.0 on a CPU. The encoder is
-PyTorch's own `nn.TransformerEncoderLayer`, padded to twelve devices with a mask, so nothing of the Rust code's way
-of packing tokens is repeated here.
+Needs torch. The committed fixture was written by torch 2.15.0 on a CPU. The encoder is PyTorch's
+`nn.TransformerEncoderLayer`, padded to twelve devices with a mask, so that the packing of the Rust code is not
+repeated here.
 
 Parameters and inputs are not stored: both sides draw them from the generator below (xorshift64*, Vigna 2016).
-`tests/fixtures/pytorch.f32` holds little-endian f32 one section after another; `pytorch.json` says which.
+`tests/fixtures/pytorch.f32` has sections of little-endian f32; `pytorch.json` lists them.
 """
 
 import json
@@ -22,7 +22,7 @@ DEVICE_COUNTS = [6, 0, 12, 1, 3, 6, 9, 2, 10, 5, 6, 4, 7, 8, 11, 0, 6, 3, 12, 1]
 DEVICES_MAX = 12
 STEPS = 3
 LEARNING_RATE = 3e-4
-# Every so many gradients and parameters are kept; odd, so that every column of a matrix is met.
+# Every 13th gradient and parameter is kept. The number is odd, so that every column of a matrix occurs.
 STRIDE = 13
 
 

@@ -1,11 +1,10 @@
-"""Freezes what PyTorch makes of the networks that the paper compares with, for `tests/pytorch_baselines.rs`.
+"""Writes the results of the networks of the paper's baselines in PyTorch, for `tests/pytorch_fixture.rs`.
 
     python3 host-trainer/scripts/pytorch_fixture_baselines.py
 
-Needs torch and installs nothing; the committed fixture was written by torch 2.15.0 on a CPU. The convolutions are
-PyTorch's own `nn.Conv2d`, every sample has maps of its own, and state and preference enter the first layer as one
-vector, so nothing of the Rust code's unfolding and sharing is repeated here. How numbers are drawn and stored is told
-in `pytorch_fixture.py`.
+Needs torch. The committed fixture was written by torch 2.15.0 on a CPU. The convolutions are PyTorch's `nn.Conv2d`,
+every sample has its own maps, and state and preference enter the first layer as one vector, so that the unfolding and
+sharing of the Rust code is not repeated here. `pytorch_fixture.py` documents how numbers are drawn and stored.
 """
 
 import json
@@ -17,7 +16,7 @@ from torch import nn
 
 from pytorch_fixture import LEARNING_RATE, SEED, STEPS, Generator
 
-# Preferences of each state.
+# Number of preferences of each state.
 COPIES = [3, 1, 0, 2, 1, 3, 3, 1, 1, 2, 1]
 STRIDE = 29
 LOCAL, GLOBAL, CHANNELS, FILTERS, KERNEL, HIDDEN = (10, 10), (11, 15), 4, 16, 5, 256
@@ -62,7 +61,7 @@ class Maps(nn.Module):
         *maps, battery = state
         parts = []
         for (first, second), image in zip(self.branches, maps):
-            # The maps, and what is flattened, have the channels of a cell side by side.
+            # In maps and flattened vectors the channels of a cell are adjacent.
             out = torch.relu(second(torch.relu(first(image.permute(0, 3, 1, 2)))))
             parts.append(out.permute(0, 2, 3, 1).flatten(1))
         return self.head(torch.cat([*parts, battery], 1), preference)

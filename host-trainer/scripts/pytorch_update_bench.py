@@ -1,11 +1,11 @@
-"""Times one update of the learner in PyTorch's eager mode, the yardstick of `benches/update.rs`.
+"""Measures one update in PyTorch's eager mode, for comparison with `benches/update_ms.rs`.
 
     python3 host-trainer/scripts/pytorch_update_bench.py [rounds]
 
-One thread, 96 samples of nine tokens (six devices, no padding), the same twelve units of work: three target forwards,
-two critics and the actor forward and backward, three Adams, two Polyak steps. PyTorch gets its fastest eager means:
-scaled_dot_product_attention, fused Adam, foreach Polyak, no mask. Prints the least milliseconds over the rounds, by
-the processor's time for this process and by the wall clock. Needs torch and installs nothing.
+One thread, 96 samples of nine tokens (six devices, no padding), the same work: three forward passes for the targets,
+forward and backward passes of two critics and the actor, three Adam steps, two Polyak steps. PyTorch uses its fastest
+eager functions: scaled_dot_product_attention, fused Adam, foreach Polyak, no mask. Prints the minimum over the rounds,
+in CPU and wall-clock milliseconds. Needs torch.
 """
 
 import sys

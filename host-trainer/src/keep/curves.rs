@@ -93,13 +93,18 @@ pub fn scalars_in(value: &Value) -> Option<Vec<(String, f64)>> {
 #[must_use]
 pub fn scalars_of(tables: &Tables) -> Vec<(String, f64)> {
     let of_one = |(scenario, table): &(String, crate::judge::evaluation::Table)| {
-        [
+        let mut scalars = vec![
             (format!("{scenario}/hypervolume"), table.hypervolume),
             (format!("{scenario}/utility"), f64::from(table.utility)),
             (format!("{scenario}/coverage_percent"), f64::from(table.coverage())),
             (format!("{scenario}/least_energy"), f64::from(table.least_energy())),
             (format!("{scenario}/least_energy_std"), f64::from(table.least_energy_std())),
-        ]
+        ];
+        // Older curves have no hypervolume of single realizations.
+        if table.mean_hypervolume > 0.0 {
+            scalars.push((format!("{scenario}/mean_hypervolume"), table.mean_hypervolume));
+        }
+        scalars
     };
     tables.0.iter().flat_map(of_one).collect()
 }
