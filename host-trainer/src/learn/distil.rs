@@ -112,7 +112,7 @@ pub struct Distillation {
 }
 
 /// The checkpoint after the settings; the field order is the file format. The current flights and the examples of the
-/// shortest mission are not in it: they start anew.
+/// shortest mission are not in it: they start again.
 #[derive(Serialize, Deserialize)]
 struct Stored {
     actor: Vec<f32>,

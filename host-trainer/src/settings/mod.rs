@@ -116,8 +116,8 @@ pub struct Settings {
     /// the policy maximises.
     #[arg(long, default_value_t = TwinMinimum::PerObjective)]
     pub twin_minimum: TwinMinimum,
-    /// Slots of reward in a target before the critics are asked (n-step return; paper: 1). Longer returns carry data
-    /// collected at the end of a detour back faster, and are biased towards older policies.
+    /// Slots of reward in a target before the bootstrapped value (n-step return; paper: 1). Longer returns carry data
+    /// from the end of a detour back faster, with a bias towards older policies.
     #[arg(long, default_value_t = 1)]
     pub n_step: usize,
     /// Fingerprint of the city that the run trains in; the default city when absent.
