@@ -4,14 +4,19 @@ const Charts = {
     const points = flight.live;
     const span = Math.max(1, flight.end - flight.start);
     const units = flight.scene.battery_units || Math.max(1, ...points.map((p) => p.battery_units || 0));
-    byId("charts").replaceChildren(this.chart("Share of the data collected and of the battery units left, over time", [
-      { name: "data collected", colour: "var(--data)", value: (p) => p.collected },
-      { name: "battery left", colour: "var(--battery)", value: (p) => (p.battery_units === null ? null : p.battery_units / units) },
+    const names = [["data collected", "--data"], ["battery left", "--battery"]].map(([name, variable]) => {
+      const swatch = element("span", { class: "swatch" });
+      swatch.style.background = `var(${variable})`;
+      return element("span", {}, swatch, name);
+    });
+    byId("charts").replaceChildren(element("p", { class: "legend" }, ...names), this.chart("Share of the data collected and of the battery units left, over time", [
+      { colour: "var(--data)", value: (p) => p.collected },
+      { colour: "var(--battery)", value: (p) => (p.battery_units === null ? null : p.battery_units / units) },
     ], points, flight.start, span, t));
   },
 
   chart(words, series, points, start, span, t) {
-    const [width, height, left, bottom] = [600, 150, 40, 22];
+    const [width, height, left, bottom] = [Math.max(280, byId("charts").clientWidth), 150, 40, 22];
     const x = (time) => left + ((width - left - 8) * (time - start)) / span;
     const y = (share) => 8 + (height - bottom - 8) * (1 - Math.min(1, share));
     const drawing = shape("svg", { class: "chart", viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": words });
@@ -22,11 +27,10 @@ const Charts = {
         label(`${100 * share} %`, left - 4, y(share) + 4));
     }
     drawing.append(label(clock(start), left, height - 6, "start"), label(clock(start + span), width - 8, height - 6));
-    series.forEach(({ name, colour: stroke, value }, index) => {
+    series.forEach(({ colour: stroke, value }) => {
       const shown = points.filter((p) => value(p) !== null && value(p) !== undefined);
       const line = shown.map((p) => `${x(p.t_s).toFixed(1)},${y(value(p)).toFixed(1)}`).join(" ");
-      drawing.append(shape("polyline", { points: line, fill: "none", stroke, "stroke-width": 2 }),
-        shape("text", { x: left + 10 + 130 * index, y: 20, "font-size": 12, fill: stroke, "font-weight": 600 }, name));
+      drawing.append(shape("polyline", { points: line, fill: "none", stroke, "stroke-width": 2 }));
     });
     drawing.append(shape("line", { x1: x(t), x2: x(t), y1: 8, y2: height - bottom, stroke: "var(--ink)" }));
     return drawing;
