@@ -18,17 +18,19 @@
 //! bodies are at most 1 KiB, connections and viewers are counted and bounded, commands are limited in rate.
 //!
 //! # Commands
-//! The page has no way to the aircraft of its own. An [`Order`] becomes a MAVLink command of a ground station
+//! [`Dashboard`] joins both for a program that owns a pilot. The page has no way to the aircraft of its own. An [`Order`] becomes a MAVLink command of a ground station
 //! ([`GroundClient`]), passes the same checks as any other, and the page shows the acknowledgement.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
 mod access;
+mod dashboard;
 mod flight;
 mod ground;
 mod order;
 mod page;
 mod server;
+mod words;
 
 pub use access::{Access, AccessError, Token};
 pub use flight::{
