@@ -70,14 +70,14 @@ const Panels = {
     const strongest = Math.max(0.01, ...matrix.flat());
     const cell = (weight, most) => {
       const node = element("td", {}, weight.toFixed(2).replace("0.", "."));
-      node.style.background = `color-mix(in srgb, var(--attention) ${Math.round((55 * weight) / most)}%, var(--panel))`;
+      node.style.background = `color-mix(in srgb, var(--attention) ${Math.round((38 * weight) / most)}%, var(--panel))`;
       return node;
     };
     const row = (name, weights, most) => element("tr", {}, element("th", { scope: "row" }, name),
       ...weights.slice(0, size).map((weight) => cell(weight, most)));
     table.replaceChildren(
       element("caption", { class: "hidden" }, "Attention of the second layer: rows attend to columns"),
-      element("thead", {}, element("tr", {}, element("th", { scope: "col" }, ""),
+      element("thead", {}, element("tr", {}, element("td", {}),
         ...names.map((name) => element("th", { scope: "col" }, name)))),
       element("tbody", {}, ...names.map((name, index) => row(name, matrix[index], strongest)),
         row("received", received, Math.max(0.01, ...received))));
