@@ -273,6 +273,10 @@ impl Component {
     /// See [`NotSent`].
     pub fn steer(&mut self, now: Instant, target: &PositionTarget) -> Result<(), NotSent> {
         self.send_setpoint(now, target)?;
+        if !self.autopilot.companion_may_steer() {
+            // PX4 before OFFBOARD: it follows targets of its own, and ours are not in force yet.
+            self.steering.end();
+        }
         self.steering.sent(now, target.position);
         Ok(())
     }

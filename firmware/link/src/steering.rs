@@ -15,6 +15,7 @@ pub(crate) struct Steering {
     since: Option<Instant>,
     followed: Option<Ned>,
     foreign: Option<Ned>,
+    ended: bool,
 }
 
 impl Steering {
@@ -29,6 +30,9 @@ impl Steering {
 
     /// A target of ours leaves.
     pub fn sent(&mut self, now: Instant, target: Ned) {
+        if self.ended {
+            *self = Steering::default();
+        }
         self.since.get_or_insert(now);
         match self.sent.back().copied() {
             Some((_, last)) if last == target => return,
@@ -58,14 +62,15 @@ impl Steering {
         self.followed = Some(target);
     }
 
-    /// The target of someone else, if the autopilot followed one since we began to steer. Stays until [`Steering::end`].
+    /// The target of someone else, if the autopilot followed one since we began to steer. Stays until we begin again.
     pub const fn foreign(&self) -> Option<Ned> {
         self.foreign
     }
 
-    /// We stop steering: later targets are not ours to judge.
+    /// We stop steering. Targets are still compared, since the aircraft may have to be given back; the next target of
+    /// ours is a new beginning.
     pub fn end(&mut self) {
-        *self = Steering::default();
+        self.ended = true;
     }
 }
 
@@ -105,7 +110,9 @@ mod tests {
         steering.follows(ms(3_400), &report(20.0), None);
         assert_eq!(steering.foreign(), Some(at(300.0)), "also after ours is followed again");
         steering.end();
-        assert_eq!(steering.foreign(), None);
+        assert_eq!(steering.foreign(), Some(at(300.0)));
+        steering.sent(ms(9_000), at(40.0));
+        assert_eq!(steering.foreign(), None, "another flight");
     }
 
     #[test]

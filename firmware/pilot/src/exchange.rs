@@ -1,39 +1,105 @@
 //! What goes into the machine and what comes out of it.
 
-use crate::Vehicle;
+use crate::{DeviceSite, Mission, Vehicle};
 use core::fmt::{self, Write};
 use gleaner_link::{AutopilotCommand, Parameters, Severity};
 use gleaner_policy::DeviceState;
-use gleaner_units::{BatteryUnits, Ned};
+use gleaner_units::{BatteryUnits, Duration, Instant, MetresPerSecond, Ned};
 use heapless::{String, Vec};
 
-/// What the operator asked for.
+/// What the operator requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// `GLN_ENABLE` 0 or `MAV_CMD_USER_2` 0.
     Off,
-    /// `GLN_ENABLE` 1 or `MAV_CMD_USER_2` 1, also when it was 1 before.
+    /// `GLN_ENABLE` 1 or `MAV_CMD_USER_2` 1.
     Engage,
     /// `GLN_ENABLE` 2 or `MAV_CMD_USER_2` 2.
     Shadow,
     /// `MAV_CMD_USER_3`.
     Return,
+    /// The program is about to end: give the aircraft back first.
+    HandBack,
+}
+
+/// Limits that a program sets once. They are not parameters: an operator does not change them in flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rules {
+    /// A request to engage that is not fulfilled ends after this time.
+    pub request_lifetime: Duration,
+    /// After this time in flight without a report of any device the mission goes home.
+    pub blind_return: Duration,
+    /// Mean descent rate of the autopilot's landing: ArduCopter and PX4 took 57 s and 54 s from 60 m.
+    pub descent_rate: MetresPerSecond,
+}
+
+impl Rules {
+    /// 60 s, 60 s, 1.05 m/s.
+    pub const DEFAULT: Rules = Rules {
+        request_lifetime: Duration::from_secs(60),
+        blind_return: Duration::from_secs(60),
+        descent_rate: MetresPerSecond(1.05),
+    };
+}
+
+impl Default for Rules {
+    fn default() -> Rules {
+        Rules::DEFAULT
+    }
+}
+
+/// The radio's view of the mission's devices. Computed on request: only a decision needs all of it.
+pub trait Devices {
+    /// The device with this index in the mission, with ageing applied.
+    fn state(&self, index: usize, site: &DeviceSite) -> DeviceState;
+}
+
+/// All devices of `mission`, in its order.
+pub(crate) fn device_states<'a>(
+    mission: &'a Mission,
+    devices: &'a dyn Devices,
+) -> impl Iterator<Item = DeviceState> + 'a {
+    mission.devices.iter().enumerate().map(|(index, site)| devices.state(index, site))
+}
+
+/// 1 - remaining / initial, both over all devices; 0 for a mission without data.
+pub(crate) fn collected(mission: &Mission, devices: &dyn Devices) -> f32 {
+    let initial = mission.initial_data();
+    let remaining: f32 = device_states(mission, devices).map(|device| device.remaining).sum();
+    if initial > 0.0 { (1.0 - remaining / initial).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// What came in from the radio.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RadioActivity {
+    /// When the last report of a device of this mission arrived.
+    pub heard_at: Option<Instant>,
+    /// Bytes on the radio's port since boot.
+    pub bytes: u32,
+    /// Reports since boot, of all devices and ports.
+    pub reports: u32,
 }
 
 /// What the machine looks at in one poll.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Inputs<'a> {
-    /// What the autopilot says.
+    /// The autopilot's messages.
     pub vehicle: &'a Vehicle,
-    /// The devices of the mission, in its order, with ageing already applied.
-    pub devices: &'a [DeviceState],
+    /// The devices of the mission.
+    pub devices: &'a dyn Devices,
+    /// The radio's port.
+    pub radio: RadioActivity,
     /// The operator's parameters.
     pub parameters: &'a Parameters,
-    /// The operator's newest request since the last poll.
-    pub request: Option<Request>,
+    /// The program's limits.
+    pub rules: &'a Rules,
+    /// The operator's requests since the last poll, in order.
+    pub requests: &'a [Request],
     /// Whether any heartbeat since the last poll showed a mode in which someone else steers, even if the last
     /// one does not.
     pub other_mode_seen: bool,
+    /// Whether the autopilot followed a target that we did not send, since we began to send targets.
+    pub foreign_target: bool,
     /// Commands of ours that ended since the last poll, and whether the autopilot accepted them.
     pub ended: &'a [(AutopilotCommand, bool)],
     /// Whether an input on the companion or board inhibits engaging, such as a remove-before-flight switch.
@@ -60,9 +126,13 @@ pub struct Telemetry {
     pub spare: Option<BatteryUnits>,
     /// The device most attended to in the last decision, as its index in the mission.
     pub attended: Option<u16>,
+    /// Battery percent that a unit costs, as learned in flight.
+    pub unit_pct: f32,
+    /// Battery percent expected at touchdown if the mission went home now; negative when it does not suffice.
+    pub land_pct: Option<f32>,
 }
 
-/// What the machine wants to be sent.
+/// What the machine sends.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
     /// Drop every target and command of ours that has not left or is not answered yet. Comes before the rest.
@@ -72,7 +142,7 @@ pub struct Outputs {
     /// A command for the autopilot; the link repeats it until it is answered.
     pub command: Option<AutopilotCommand>,
     /// Lines for the operator.
-    pub notices: Vec<Notice, 6>,
+    pub notices: Vec<Notice, 8>,
     /// Whether a decision was made: see [`crate::Machine::decision`].
     pub decided: bool,
     /// Once a second.

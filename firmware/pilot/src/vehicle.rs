@@ -1,4 +1,4 @@
-//! What the machine must know of the autopilot, with ages already applied.
+//! What the machine knows of the autopilot, with ages already applied.
 
 use gleaner_link::{Autopilot, Firmware, FlightMode, LandedState};
 use gleaner_units::{Duration, GeoPoint, Instant, Ned};
@@ -15,16 +15,20 @@ pub struct Vehicle {
     pub firmware: Option<Firmware>,
     /// Mode of the last heartbeat; `None` when none came for five seconds.
     pub mode: Option<FlightMode>,
+    /// When the last heartbeat arrived; `None` when none came for five seconds.
+    pub heartbeat_at: Option<Instant>,
     /// Whether the motors are armed, as of the last heartbeat.
     pub armed: bool,
     /// Whether any failsafe is latched.
     pub failsafe: bool,
-    /// Whether the autopilot says that it stands on the ground.
+    /// Whether the autopilot reports that it stands on the ground.
     pub on_ground: bool,
     /// Whether the estimator trusts itself, the position is fresh (1 s) and the origin is known.
     pub ready: bool,
-    /// Position in the estimator's frame, if told within two seconds.
+    /// Position in the estimator's frame, if reported within two seconds.
     pub position: Option<Ned>,
+    /// The autopilot's clock at the last position, ms since it started.
+    pub boot_ms: Option<u32>,
     /// Where the estimator's origin is.
     pub origin: Option<GeoPoint>,
     /// Home below the estimator's origin, m.
@@ -41,11 +45,13 @@ impl Vehicle {
         Vehicle {
             firmware: autopilot.firmware(),
             mode: autopilot.mode(),
+            heartbeat_at: autopilot.heartbeat_at(),
             armed: autopilot.is_armed(),
             failsafe: autopilot.failsafe().is_some(),
             on_ground: autopilot.landed() == LandedState::OnGround,
             ready: autopilot.is_ready(now),
-            position: autopilot.position(now, POSITION_AGE).map(|told| told.position),
+            position: autopilot.position(now, POSITION_AGE).map(|reported| reported.position),
+            boot_ms: autopilot.boot_ms(),
             origin: origin.map(|origin| origin.point),
             // From the two altitudes: ArduPilot fills HOME_POSITION's local fields with zeros.
             home_down_m: origin.zip(autopilot.home()).map(|(origin, home)| {
@@ -55,13 +61,13 @@ impl Vehicle {
         }
     }
 
-    /// Whether the autopilot is heard and follows our targets.
+    /// Whether heartbeats arrive and show a mode in which targets are obeyed.
     #[must_use]
     pub fn is_guided(&self) -> bool {
         self.mode.is_some_and(FlightMode::companion_may_steer)
     }
 
-    /// Whether the autopilot is heard and lands or returns by itself.
+    /// Whether heartbeats arrive and show that the autopilot lands or returns by itself.
     #[must_use]
     pub const fn is_landing_or_returning(&self) -> bool {
         matches!(self.mode, Some(FlightMode::Land | FlightMode::Return))

@@ -2,16 +2,16 @@
 
 use gleaner_units::{Cell, Duration, Instant, Metres, Ned};
 
-/// How long a leg may bring no progress. Long against a gust (a cell takes about 5 s), short against a battery.
+/// How long a leg may go without progress: long against a gust (a cell takes about 5 s), short against a battery.
 pub(crate) const STALL: Duration = Duration::from_secs(20);
 
-/// Coming nearer by less is noise of the position.
+/// A smaller approach is noise of the position.
 const PROGRESS_M: f32 = 0.5;
 
 /// Why this leg is flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// To the centre of the cell under the aircraft; paid for by nobody.
+    /// To the centre of the cell under the aircraft; not paid for.
     Centre,
     /// Over the same cell for one slot.
     Hover,
@@ -19,7 +19,7 @@ pub(crate) enum Purpose {
     Move,
 }
 
-/// A target and how far the aircraft is with it.
+/// A target, and the progress towards it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Leg {
     pub(crate) cell: Cell,
@@ -27,6 +27,10 @@ pub(crate) struct Leg {
     pub(crate) from: Cell,
     pub(crate) target: Ned,
     pub(crate) purpose: Purpose,
+    /// Where the aircraft was sent from.
+    start: Ned,
+    /// Fraction of the way that was covered at most.
+    covered: f32,
     not_before: Instant,
     nearest_m: f32,
     progress_at: Instant,
@@ -39,13 +43,54 @@ pub(crate) enum Progress {
     Underway,
     /// Inside the arrival radius, and the slot is over.
     Arrived,
-    /// [`STALL`] without coming nearer; told once, then the time starts anew.
+    /// [`STALL`] without coming nearer; reported once, then the time starts anew.
     Stalled,
 }
 
 impl Leg {
-    pub(crate) fn new(now: Instant, purpose: Purpose, from: Cell, cell: Cell, target: Ned) -> Leg {
-        Leg { cell, from, target, purpose, not_before: now, nearest_m: f32::INFINITY, progress_at: now }
+    /// A leg to `target` in `cell`; `start` is where the aircraft was sent before, in cell `from`.
+    pub(crate) fn new(
+        now: Instant,
+        purpose: Purpose,
+        (from, start): (Cell, Ned),
+        (cell, target): (Cell, Ned),
+    ) -> Leg {
+        Leg {
+            cell,
+            from,
+            target,
+            purpose,
+            start,
+            covered: 0.0,
+            not_before: now,
+            nearest_m: f32::INFINITY,
+            progress_at: now,
+        }
+    }
+
+    /// Distance over the ground between `position` and the straight way of this leg, m.
+    pub(crate) fn beside(&self, position: &Ned) -> f32 {
+        let along = self.along(position).clamp(0.0, 1.0);
+        let nearest = Ned {
+            north_m: self.start.north_m + along * (self.target.north_m - self.start.north_m),
+            east_m: self.start.east_m + along * (self.target.east_m - self.start.east_m),
+            down_m: position.down_m,
+        };
+        position.horizontal_distance(&nearest).0
+    }
+
+    /// The fraction of the way that was covered since the last call.
+    pub(crate) fn cover(&mut self, position: &Ned) -> f32 {
+        let covered = self.along(position).clamp(self.covered, 1.0);
+        covered - core::mem::replace(&mut self.covered, covered)
+    }
+
+    /// How far along the way the aircraft is: 0 at the start, 1 at the target.
+    fn along(&self, position: &Ned) -> f32 {
+        let way = [self.target.north_m - self.start.north_m, self.target.east_m - self.start.east_m];
+        let gone = [position.north_m - self.start.north_m, position.east_m - self.start.east_m];
+        let length2 = way[0] * way[0] + way[1] * way[1];
+        if length2 > 0.0 { (way[0] * gone[0] + way[1] * gone[1]) / length2 } else { 1.0 }
     }
 
     /// The same leg, not over before `slot` has passed.
@@ -53,13 +98,13 @@ impl Leg {
         Leg { not_before: self.not_before + slot, ..self }
     }
 
-    /// Does not wait for the slot any longer.
+    /// Ends the wait for the slot.
     pub(crate) fn hurry(&mut self) {
         self.not_before = Instant::ZERO;
     }
 
-    /// Neither autopilot says "reached" for a position target, so arrival is ours to see; and a target outside
-    /// the autopilot's own fence is dropped without a word, so is the lack of progress.
+    /// Neither autopilot reports arrival at a position target, and both drop a target outside their own fence without a
+    /// message. So arrival and the lack of progress are judged here.
     pub(crate) fn watch(&mut self, now: Instant, position: &Ned, radius: Metres) -> Progress {
         let distance_m = position.horizontal_distance(&self.target).0;
         if distance_m < radius.0 {
@@ -89,7 +134,7 @@ mod tests {
     }
 
     fn leg(purpose: Purpose) -> Leg {
-        Leg::new(Instant::ZERO, purpose, Cell::new(0, 0), Cell::new(0, 1), at(20.0))
+        Leg::new(Instant::ZERO, purpose, (Cell::new(0, 0), at(0.0)), (Cell::new(0, 1), at(20.0)))
     }
 
     fn after_s(secs: f32) -> Instant {
@@ -108,6 +153,16 @@ mod tests {
         let mut hurried = leg(Purpose::Hover).lasting(Duration::from_secs(4));
         hurried.hurry();
         assert_eq!(hurried.watch(after_s(0.1), &at(20.0), RADIUS), Progress::Arrived);
+    }
+
+    #[test]
+    fn the_way_is_covered_once_and_measured_sideways() {
+        let mut leg = leg(Purpose::Move);
+        assert_eq!(leg.cover(&at(5.0)), 0.25);
+        assert_eq!(leg.cover(&at(3.0)), 0.0, "back is not covered again");
+        assert_eq!(leg.cover(&at(30.0)), 0.75);
+        assert_eq!(leg.beside(&Ned { east_m: -7.0, ..at(12.0) }), 7.0);
+        assert_eq!(leg.beside(&at(50.0)), 30.0);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use gleaner_units::{Duration, Instant, Ned};
 /// more than 2 Hz. 20 Hz when polled that often, never below 10 Hz when polled at 20 Hz or more.
 const PX4_SPACING: Duration = Duration::from_millis(50);
 
-/// ArduCopter remembers a position target for ever, so once would do. Once a second covers a lost packet.
+/// ArduCopter keeps a position target without a timeout. Once a second covers a lost packet.
 const ARDUPILOT_SPACING: Duration = Duration::from_secs(1);
 
 /// The pace of the position targets.
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_never_leaves() {
+    fn a_target_that_is_not_finite_never_leaves() {
         let nan = Ned { east_m: f32::NAN, ..A };
         assert!(
             sent(Firmware::Px4, 50, |_| nan).is_empty() && sent(Firmware::ArduPilot, 50, |_| nan).is_empty()

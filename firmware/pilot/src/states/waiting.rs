@@ -1,23 +1,25 @@
-//! Waiting and shadow: the two states that look and do not fly.
+//! Waiting: a request to engage that is not fulfilled yet.
 
-use crate::decide::decider::{Deliberation, ask};
-use crate::flight::plan::{self, cell_under, usable_battery};
+use super::Outcome;
+use crate::flight::energy::Energy;
+use crate::flight::plan;
 use crate::flight::stream::Stream;
-use crate::machine::{Phase, preference};
-use crate::states::flying::{Flight, slot};
-use crate::{Inputs, Machine, Missing, Outputs, State, Vehicle};
+use crate::scene::Scene;
+use crate::{Missing, Outputs, TakeOver, Vehicle};
 use gleaner_link::{Firmware, FlightMode, Severity};
-use gleaner_policy::Policy;
-use gleaner_units::{Cell, Decimal, Duration, Instant, Ned};
+use gleaner_units::{Decimal, Duration, Instant, Ned};
 
-/// What is missing is told at most this often, so that a condition at its edge does not flood the link.
-const TELL_PERIOD: Duration = Duration::from_secs(1);
+/// What is missing is reported at most this often, so that a condition at its edge does not flood the link.
+const REPORT_PERIOD: Duration = Duration::from_secs(1);
+/// Heartbeats come once a second: their absence is worth a text only after this time.
+const HEARTBEAT_DUE: Duration = Duration::from_secs(3);
 
-/// An engage request that is not fulfilled yet.
+/// A request to engage.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Wait {
+    requested_at: Instant,
     missing: Option<Missing>,
-    told: Option<(Instant, Missing)>,
+    reported: Option<(Instant, Missing)>,
     mode: Option<FlightMode>,
     was_armed: bool,
     hold: Option<Ned>,
@@ -25,10 +27,11 @@ pub(crate) struct Wait {
 }
 
 impl Wait {
-    pub(crate) fn new(vehicle: &Vehicle) -> Wait {
+    pub(crate) fn new(now: Instant, vehicle: &Vehicle) -> Wait {
         Wait {
+            requested_at: now,
             missing: None,
-            told: None,
+            reported: None,
             mode: vehicle.mode,
             was_armed: vehicle.armed,
             hold: None,
@@ -40,129 +43,85 @@ impl Wait {
         self.missing
     }
 
-    /// PX4: where it is, so that a switch to OFFBOARD moves nothing; once in OFFBOARD, where it then was.
-    pub(crate) fn target_due(&mut self, now: Instant, vehicle: &Vehicle) -> Option<Ned> {
+    pub(crate) const fn stream(&self) -> Stream {
+        self.stream
+    }
+
+    /// PX4 accepts OFFBOARD only when targets stream already: the place of the aircraft, so that the switch moves
+    /// nothing; once in OFFBOARD, the place where it then was. ArduPilot needs none. Resumed targets clear a failsafe of
+    /// PX4, so there are none while one is set or while heartbeats are no evidence.
+    pub(crate) fn target_due(&mut self, scene: &Scene<'_>) -> Option<Ned> {
+        let vehicle = scene.vehicle();
+        if vehicle.firmware != Some(Firmware::Px4) || vehicle.failsafe || !scene.hears() {
+            return None;
+        }
         if !vehicle.is_guided() || self.hold.is_none() {
             self.hold = vehicle.position.filter(|_| vehicle.ready);
         }
-        self.stream.due(now, self.hold?, Firmware::Px4)
+        self.stream.due(scene.now, self.hold?, Firmware::Px4)
+    }
+
+    pub(crate) fn step(&mut self, scene: &Scene<'_>, energy: &Energy, out: &mut Outputs) -> Outcome {
+        let vehicle = scene.vehicle();
+        if self.was_taken(scene) {
+            return Outcome::Passive(TakeOver::Mode);
+        }
+        if vehicle.failsafe {
+            out.say(Severity::Warning, format_args!("gleaner: request ended, autopilot failsafe"));
+            return Outcome::Idle;
+        }
+        if scene.now.since(self.requested_at) >= scene.inputs.rules.request_lifetime {
+            out.say(Severity::Warning, format_args!("gleaner: request expired, request again"));
+            return Outcome::Idle;
+        }
+        // ArduCopter disarms by itself after ten seconds on the ground. The next arming is another flight and
+        // needs another request.
+        if self.was_armed && !vehicle.armed {
+            return Outcome::Idle;
+        }
+        self.was_armed |= vehicle.armed;
+        match plan::check(scene, energy, self.requested_at) {
+            Ok(plan) => Outcome::Engage(plan),
+            Err(missing) => {
+                self.missing = Some(missing);
+                self.report(scene, energy, missing, out);
+                Outcome::Stay
+            }
+        }
     }
 
     /// Whether someone took the aircraft back before we had it: GUIDED was left, or the autopilot began to
     /// return or land.
-    fn was_taken(&mut self, inputs: &Inputs<'_>) -> bool {
-        let Some(mode) = inputs.vehicle.mode else { return false };
+    fn was_taken(&mut self, scene: &Scene<'_>) -> bool {
+        let vehicle = scene.vehicle();
+        let Some(mode) = vehicle.mode else { return false };
         let was = self.mode.replace(mode);
-        let left = mode != FlightMode::Guided || inputs.other_mode_seen;
-        let began_to_leave = was.is_some_and(|was| was != mode) && inputs.vehicle.is_landing_or_returning();
+        let left = mode != FlightMode::Guided || scene.inputs.other_mode_seen;
+        let began_to_leave = was.is_some_and(|was| was != mode) && vehicle.is_landing_or_returning();
         (was == Some(FlightMode::Guided) && left) || began_to_leave
     }
-}
 
-impl Machine {
-    pub(crate) fn wait(
-        &mut self,
-        now: Instant,
-        mut wait: Wait,
-        inputs: &Inputs<'_>,
-        out: &mut Outputs,
-    ) -> Phase {
-        let vehicle = inputs.vehicle;
-        if wait.was_taken(inputs) {
-            return Phase::Passive;
+    fn report(&mut self, scene: &Scene<'_>, energy: &Energy, missing: Missing, out: &mut Outputs) {
+        let is_early = missing == Missing::Heartbeat && scene.now.since(self.requested_at) < HEARTBEAT_DUE;
+        let is_due = self
+            .reported
+            .is_none_or(|(at, reported)| reported != missing && scene.now.since(at) >= REPORT_PERIOD);
+        if is_early || !is_due {
+            return;
         }
-        // ArduCopter disarms by itself after ten seconds on the ground. The next arming is another flight and
-        // wants another request.
-        if wait.was_armed && !vehicle.armed {
-            return Phase::Idle;
-        }
-        wait.was_armed |= vehicle.armed;
-        match plan::check(&self.mission, &self.guard, inputs) {
-            Ok(plan) => Phase::Engaged(Flight::new(now, plan, wait.stream)),
-            Err(missing) => {
-                wait.missing = Some(missing);
-                let due = wait.told.is_none_or(|(at, told)| told != missing && now.since(at) >= TELL_PERIOD);
-                if due {
-                    wait.told = Some((now, missing));
-                    self.tell_missing(missing, inputs, out);
-                }
-                Phase::Waiting(wait)
-            }
-        }
-    }
-
-    fn tell_missing(&self, missing: Missing, inputs: &Inputs<'_>, out: &mut Outputs) {
-        let needed =
-            cell_under(&self.mission, inputs.vehicle).and_then(|(cell, _)| self.guard.way_home(cell));
-        match (missing, needed, usable_battery(&self.mission, inputs)) {
-            (Missing::EnoughBattery, Some(way), Some(battery)) => {
-                let needed = way + self.guard.reserve();
+        self.reported = Some((scene.now, missing));
+        let needed = scene.cell_under().and_then(|(cell, _)| scene.guard.way_home(cell));
+        let offered = scene.vehicle().battery_percent.map(|percent| energy.offered(scene, percent));
+        match (missing, needed, offered) {
+            (Missing::EnoughBattery, Some(way), Some(offered)) => {
+                let needed = way + scene.guard.reserve();
+                let (offered, needed) = (Decimal::<1>(offered.0), Decimal::<1>(needed.0));
                 out.say(
                     Severity::Warning,
-                    format_args!(
-                        "gleaner: battery {}, way home needs {}",
-                        Decimal::<1>(battery.0),
-                        Decimal::<1>(needed.0)
-                    ),
+                    format_args!("gleaner: battery {offered}, way home needs {needed}"),
                 );
             }
             _ => out.say(Severity::Info, format_args!("gleaner: waiting: {}", missing.text())),
         }
-    }
-}
-
-/// What shadow mode has decided last.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct ShadowWatch {
-    last: Option<(Cell, Instant)>,
-    failed: bool,
-}
-
-impl Machine {
-    /// Decides when the aircraft comes to the centre of another cell, and after each slot; commands nothing.
-    #[inline(never)]
-    pub(crate) fn shadow<P: Policy>(
-        &mut self,
-        now: Instant,
-        mut watch: ShadowWatch,
-        inputs: &Inputs<'_>,
-        policy: &mut P,
-        out: &mut Outputs,
-    ) -> Phase {
-        let vehicle = inputs.vehicle;
-        let place = cell_under(&self.mission, vehicle).filter(|_| vehicle.armed && vehicle.ready);
-        let (Some((cell, offset_m)), Some(battery)) = (place, usable_battery(&self.mission, inputs)) else {
-            return Phase::Shadow(watch);
-        };
-        let slot = slot(self.mission.grid().cell(), inputs.parameters);
-        let at_centre = offset_m < inputs.parameters.arrive_radius().0;
-        let due = watch.last.is_none_or(|(last, at)| (last != cell && at_centre) || now.since(at) >= slot);
-        if !due || self.guard.distance(cell).is_none() {
-            return Phase::Shadow(watch);
-        }
-        watch.last = Some((cell, now));
-        let mut decision = Deliberation {
-            mission: &self.mission,
-            guard: &self.guard,
-            devices: inputs.devices,
-            preference: preference(inputs.parameters),
-            collected: self.collected,
-            sequence: self.sequence,
-            now,
-            state: State::Shadow,
-            cell,
-            battery,
-            altitude: inputs.parameters.altitude(),
-        }
-        .open();
-        match ask(policy, &mut decision) {
-            Ok(()) => self.keep(decision, out),
-            Err(reason) if !watch.failed => {
-                watch.failed = true;
-                out.say(Severity::Warning, format_args!("gleaner: shadow: {}", reason.text()));
-            }
-            Err(_) => {}
-        }
-        Phase::Shadow(watch)
     }
 }

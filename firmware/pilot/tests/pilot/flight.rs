@@ -45,10 +45,13 @@ fn the_ledger_is_what_the_policy_sees() {
         rig.policy.asked.iter().take(4).map(|tokens| [tokens.uav[1], tokens.uav[0]]).collect();
     // Budget 30 (90 % of 100 would be more); spare = battery - distance to (6, 4).
     assert_eq!(seen, [[30.0, 22.0], [29.0, 22.0], [28.5, 21.5], [27.5, 21.5]]);
-    rig.vehicle.battery_percent = Some(20);
+    rig.vehicle.battery_percent = Some(36);
     let asked = rig.policy.asked.len();
     rig.run(3.0);
-    assert_eq!(rig.policy.asked[asked].uav[1], 21.0, "capped by percent + 1");
+    // 60 m at 1.05 m/s, 0.9 of 0.25 units a second.
+    let landing = 60.0 / 1.05 * 0.225;
+    let capped = rig.policy.asked[asked].uav[1];
+    assert!((capped - (37.0 - landing)).abs() < 1e-3, "capped by percent + 1 less the landing: {capped}");
 }
 
 #[test]
@@ -164,7 +167,7 @@ fn ardupilot_gets_targets_on_change_and_once_a_second() {
 #[test]
 fn telemetry_comes_once_a_second() {
     let mut rig = Rig::engaged();
-    rig.devices[0].remaining = 2_000.0;
+    rig.devices.0[0].remaining = 2_000.0;
     let mut told = Vec::new();
     for _ in 0..100 {
         told.extend(rig.step().telemetry);

@@ -1,5 +1,8 @@
 //! The pilot from outside, in virtual time.
 
+mod authority;
+mod explorer;
+mod facts;
 mod flight;
 mod invariants;
 mod mission;

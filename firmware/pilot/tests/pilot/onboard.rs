@@ -224,7 +224,10 @@ impl Bench {
     fn engage(&mut self) {
         self.run(8);
         self.command(MavCmd::MAV_CMD_USER_2, 1.0);
-        self.tick();
+        // A heartbeat after the request.
+        while self.onboard.state() != State::Engaged && self.now < Instant::from_millis(20_000) {
+            self.tick();
+        }
         assert_eq!(
             self.onboard.state(),
             State::Engaged,

@@ -2,7 +2,10 @@
 
 use gleaner_guard::Guard;
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters};
-use gleaner_pilot::{DeviceSite, Inputs, Machine, Mission, Outputs, Request, State, Vehicle};
+use gleaner_pilot::{
+    DeviceSite, Devices, Inputs, Machine, Mission, Outputs, RadioActivity, Request, Rules, State, Telemetry,
+    Vehicle,
+};
 use gleaner_policy::{Attention, DeviceState, Inference, Policy, Tokens};
 use gleaner_units::{
     Action, BatteryUnits, Cell, CellSet, Duration, GeoPoint, Grid, GridFrame, HeightMap, Instant, Metres, Ned,
@@ -16,6 +19,7 @@ pub const DOWN_M: f32 = -60.0 + HOME_DOWN_M;
 pub const HOME_DOWN_M: f32 = 2.5;
 const POLL: Duration = Duration::from_millis(50);
 const FLIGHT_MPS: f32 = 10.0;
+const HEARTBEAT: Duration = Duration::from_secs(1);
 
 pub fn mission() -> Mission {
     let grid = Grid::new(8, 6, Metres(20.0)).unwrap();
@@ -34,7 +38,18 @@ pub fn mission() -> Mission {
     mission
 }
 
-/// Answers as it was told, and keeps what it was asked.
+/// Devices that are what the test says.
+#[derive(Clone)]
+pub struct Known(pub Vec<DeviceState>);
+
+impl Devices for Known {
+    fn state(&self, index: usize, _: &DeviceSite) -> DeviceState {
+        self.0[index]
+    }
+}
+
+/// Answers from a script, and keeps the tokens of each inference.
+#[derive(Clone)]
 pub struct Scripted {
     pub actions: std::collections::VecDeque<Action>,
     /// When the script is over.
@@ -59,16 +74,28 @@ impl Policy for Scripted {
     }
 }
 
+#[derive(Clone)]
 pub struct Rig {
     pub machine: Machine,
     pub mission: Mission,
     pub vehicle: Vehicle,
     pub parameters: Parameters,
-    pub devices: Vec<DeviceState>,
+    pub devices: Known,
+    pub rules: Rules,
+    /// Whether the radio reports anything.
+    pub radio_reports: bool,
+    radio: RadioActivity,
     pub policy: Scripted,
     pub now: Instant,
     pub request: Option<Request>,
     pub other_mode_seen: bool,
+    pub foreign_target: bool,
+    revoked: bool,
+    /// The last telemetry in flight.
+    pub telemetry: Option<Telemetry>,
+    /// Whether heartbeats arrive.
+    pub beats: bool,
+    beat: (Option<FlightMode>, bool),
     pub ended: Vec<(AutopilotCommand, bool)>,
     pub engage_inhibited: bool,
     /// Whether the autopilot accepts commands, or refuses them; `None`: no answer.
@@ -110,7 +137,10 @@ impl Rig {
                 ..Vehicle::default()
             },
             parameters: Parameters::default(),
-            devices,
+            devices: Known(devices),
+            rules: Rules::DEFAULT,
+            radio_reports: true,
+            radio: RadioActivity::default(),
             policy: Scripted {
                 actions: Default::default(),
                 then: Action::Hover,
@@ -121,6 +151,11 @@ impl Rig {
             now: Instant::from_millis(10_000),
             request: None,
             other_mode_seen: false,
+            foreign_target: false,
+            revoked: false,
+            telemetry: None,
+            beats: true,
+            beat: (None, false),
             ended: Vec::new(),
             engage_inhibited: false,
             accepts: Some(true),
@@ -170,19 +205,32 @@ impl Rig {
     pub fn step_after(&mut self, pause: Duration) -> Outputs {
         self.now = self.now + pause;
         self.fly(pause);
+        self.beat();
+        if self.radio_reports {
+            self.radio.heard_at = Some(self.now);
+        }
         let ended = std::mem::take(&mut self.ended);
+        let requests: Vec<Request> = self.request.take().into_iter().collect();
         let inputs = Inputs {
             vehicle: &self.vehicle,
             devices: &self.devices,
             parameters: &self.parameters,
-            request: self.request.take(),
+            radio: self.radio,
+            rules: &self.rules,
+            requests: &requests,
+            foreign_target: self.foreign_target,
             other_mode_seen: std::mem::take(&mut self.other_mode_seen),
             ended: &ended,
             engage_inhibited: self.engage_inhibited,
         };
         let out = self.machine.poll(self.now, &inputs, &mut self.policy);
         let at_ms = self.now.as_millis();
+        self.telemetry = out.telemetry.filter(|told| told.land_pct.is_some()).or(self.telemetry);
+        self.revoked |= out.withdraw;
         if let Some(target) = out.setpoint {
+            // The link compares only what is sent in our mode; a target after a revocation is a new beginning.
+            let begins = std::mem::take(&mut self.revoked) || !self.vehicle.is_guided();
+            self.foreign_target &= !begins;
             self.target = Some(target);
             self.setpoints.push((at_ms, target));
         }
@@ -224,8 +272,13 @@ impl Rig {
 
     pub fn engage(&mut self) {
         self.request = Some(Request::Engage);
-        self.step();
-        assert_eq!(self.state(), State::Engaged, "{:?}", self.texts);
+        for _ in 0..25 {
+            self.step();
+            if self.state() == State::Engaged {
+                return;
+            }
+        }
+        panic!("{:?}, missing {:?}, {:?}", self.state(), self.machine.missing(), self.texts);
     }
 
     pub fn said(&self, text: &str) -> usize {
@@ -234,6 +287,18 @@ impl Rig {
 
     pub fn commanded(&self, command: AutopilotCommand) -> usize {
         self.commands.iter().filter(|(_, sent)| *sent == command).count()
+    }
+
+    /// A heartbeat arrives once a second and with each change, as ArduPilot's do.
+    fn beat(&mut self) {
+        let beat = (self.vehicle.mode, self.vehicle.armed);
+        let is_due = self.vehicle.heartbeat_at.is_none_or(|at| self.now.since(at) >= HEARTBEAT);
+        if self.vehicle.mode.is_none() {
+            self.vehicle.heartbeat_at = None;
+        } else if self.beats && (is_due || beat != self.beat) {
+            self.vehicle.heartbeat_at = Some(self.now);
+        }
+        self.beat = beat;
     }
 
     fn answer(&mut self, command: AutopilotCommand) {

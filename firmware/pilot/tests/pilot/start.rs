@@ -39,8 +39,7 @@ fn each_missing_condition_holds_the_start_back_and_is_told_once() {
     type Spoil = fn(&mut Rig);
     let cases: [(Missing, Spoil); 14] = [
         (Missing::Autopilot, |rig| rig.vehicle.mode = None),
-        (Missing::FailsafeClear, |rig| rig.vehicle.failsafe = true),
-        (Missing::Permission, |rig| rig.engage_inhibited = true),
+        (Missing::Heartbeat, |rig| rig.beats = false),
         (Missing::Origin, |rig| rig.vehicle.origin = None),
         (Missing::Position, |rig| rig.vehicle.position = None),
         (Missing::Position, |rig| rig.vehicle.position = Some(Ned { north_m: f32::NAN, ..Ned::default() })),

@@ -124,7 +124,7 @@ fn a_pilot_who_took_over_after_a_fault_is_left_alone() {
         rig.run(1.0);
         rig.accepts = None;
         rig.vehicle.position = None;
-        rig.step();
+        rig.run(1.1);
         assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 1);
         meanwhile(&mut rig);
         assert!(rig.step().withdraw, "the link must not repeat it");

@@ -12,7 +12,7 @@ fn each_reason_to_go_home_ends_in_a_landing_on_the_terminal() {
     type Trouble = fn(&mut Rig);
     let cases: [(ReturnReason, Trouble); 5] = [
         (ReturnReason::Request, |rig| rig.request = Some(Request::Return)),
-        (ReturnReason::Battery, |rig| rig.vehicle.battery_percent = Some(3)),
+        (ReturnReason::Battery, |rig| rig.vehicle.battery_percent = Some(18)),
         (ReturnReason::Failsafe, |rig| rig.vehicle.failsafe = true),
         (ReturnReason::Policy, |rig| rig.policy.fails = true),
         (ReturnReason::Policy, |rig| rig.policy.logit = f32::NAN),
@@ -157,6 +157,7 @@ fn a_target_that_the_autopilot_drops_turns_the_flight_home_after_20_s_and_back_a
     rig.run_to(State::Fault);
     let after_ms = rig.now.as_millis() - stuck_ms;
     assert!((39_000..=41_000).contains(&after_ms), "{after_ms}");
+    rig.run(1.1);
     assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 1);
 }
 
@@ -181,7 +182,7 @@ fn an_unanswered_landing_is_asked_again_and_then_handed_back() {
         rig.accepts = Some(false);
         rig.step();
     }
-    rig.run(0.5);
+    rig.run(4.0);
     assert_eq!(rig.commanded(AutopilotCommand::Land), 3);
     assert_eq!(rig.machine.fault(), Some(Fault::LandingRefused));
     assert!(rig.commanded(AutopilotCommand::ReturnToLaunch) > 0);

@@ -1,0 +1,188 @@
+//! What flying really takes from the battery, learned from the measured percentage.
+//!
+//! Battery units are priced nominally: one for a cell, half of one for a slot of hovering. The real price depends on
+//! wind, speed and aircraft. MAVLink carries the charge in whole percent, so the only exact moments are those at which
+//! the percentage steps down: between two of them exactly that many percent were used. Each step gives one equation
+//!
+//! ```text
+//! units used = cell x cells flown + hover x nominal units hovered
+//! ```
+//!
+//! and the two prices are the least-squares solution over the last steps, with a prior that both are 1.
+
+use gleaner_units::BatteryUnits;
+
+/// Nominal units per second of hovering: half a unit for the two seconds in which 20 m are flown at 10 m/s.
+pub(crate) const HOVER_UNITS_PER_S: f32 = 0.25;
+/// Weight of an older equation per newer one: a window of about 25 steps.
+const DECAY: f32 = 0.96;
+/// Weight of the prior, in squared nominal units.
+const PRIOR: f32 = 0.3;
+/// A larger step within one report is a fault of the monitor or of a cell, not consumption.
+pub(crate) const JUMP_PERCENT: u8 = 5;
+/// A price that is learned this close to the nominal one is noise of whole percents.
+const NOISE: f32 = 1.05;
+/// Bounds of a learned price: beyond them the monitor is at fault, not the wind.
+const CHEAPEST: f32 = 0.3;
+const DEAREST: f32 = 3.0;
+/// Margin on a learned price.
+const MARGIN: f32 = 1.03;
+
+/// Nominal units flown since a percentage step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Flown {
+    cells: f32,
+    hover: f32,
+}
+
+/// What a new percentage means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Reading {
+    /// Nothing new.
+    Same,
+    /// It went down as flying does.
+    Step,
+    /// It went up, or down by more than [`JUMP_PERCENT`].
+    Jump,
+}
+
+/// The prices of a cell and of hovering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Burn {
+    /// Normal equations: cells x cells, cells x hover, hover x hover, cells x used, hover x used.
+    sums: [f32; 5],
+    flown: Flown,
+    percent: Option<u8>,
+    /// Whether the percentage has stepped since it was first seen: before that the interval has no exact start.
+    anchored: bool,
+}
+
+impl Burn {
+    pub(crate) const fn new() -> Burn {
+        Burn { sums: [0.0; 5], flown: Flown { cells: 0.0, hover: 0.0 }, percent: None, anchored: false }
+    }
+
+    /// A fraction of a cell was flown.
+    pub(crate) fn flew(&mut self, cells: f32) {
+        self.flown.cells += cells;
+    }
+
+    /// The aircraft hovered for `secs`.
+    pub(crate) fn hovered(&mut self, secs: f32) {
+        self.flown.hover += secs * HOVER_UNITS_PER_S;
+    }
+
+    /// Something else than this flight used the battery: the interval has no exact start any more.
+    pub(crate) fn interrupt(&mut self) {
+        self.flown = Flown::default();
+        self.percent = None;
+        self.anchored = false;
+    }
+
+    /// Takes in the measured percentage. `full`: units of a full battery.
+    pub(crate) fn read(&mut self, percent: u8, full: BatteryUnits) -> Reading {
+        let Some(last) = self.percent.replace(percent) else { return Reading::Same };
+        if percent == last {
+            return Reading::Same;
+        }
+        let flown = core::mem::take(&mut self.flown);
+        let was_anchored = core::mem::replace(&mut self.anchored, true);
+        let step = last.saturating_sub(percent);
+        if step == 0 || step > JUMP_PERCENT {
+            self.anchored = false;
+            return Reading::Jump;
+        }
+        if was_anchored {
+            self.learn(flown, full.0 * f32::from(step) / 100.0);
+        }
+        Reading::Step
+    }
+
+    fn learn(&mut self, Flown { cells, hover }: Flown, used: f32) {
+        let terms = [cells * cells, cells * hover, hover * hover, cells * used, hover * used];
+        for (sum, term) in self.sums.iter_mut().zip(terms) {
+            *sum = *sum * DECAY + term;
+        }
+    }
+
+    /// Units that a cell and a nominal unit of hovering take, as learned.
+    pub(crate) fn learned(&self) -> (f32, f32) {
+        let [cc, ch, hh, cu, hu] = self.sums;
+        let (cc, hh, cu, hu) = (cc + PRIOR, hh + PRIOR, cu + PRIOR, hu + PRIOR);
+        let determinant = cc * hh - ch * ch;
+        let solved = ((cu * hh - hu * ch) / determinant, (hu * cc - cu * ch) / determinant);
+        let sound = |price: f32| if price.is_finite() { price.clamp(CHEAPEST, DEAREST) } else { 1.0 };
+        (sound(solved.0), sound(solved.1))
+    }
+
+    /// The price of a nominal unit that the way home is judged by: never below 1. `slot_s` is the time of a hover, which
+    /// the guard prices at half a unit however long it is.
+    pub(crate) fn price(&self, slot_s: f32) -> f32 {
+        let (cell, hover) = self.learned();
+        let dearest = cell.max(hover * slot_s * HOVER_UNITS_PER_S / 0.5);
+        // A longer slot is dear before anything is learned; only what was learned counts here.
+        let dearest = if self.has_learned() { dearest } else { 1.0 };
+        if dearest > NOISE { dearest * MARGIN } else { 1.0 }
+    }
+
+    fn has_learned(&self) -> bool {
+        let [cc, _, hh, ..] = self.sums;
+        cc + hh > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FULL: BatteryUnits = BatteryUnits(100.0);
+
+    /// Flies cells and hovers in turn with these prices in percent.
+    fn fly(cell: f32, hover_slot: f32, slots: usize) -> Burn {
+        let mut burn = Burn::new();
+        let mut left = 90.7_f32;
+        for slot in 0..slots {
+            for _ in 0..40 {
+                if slot % 3 == 2 {
+                    burn.hovered(0.05);
+                    left -= hover_slot / 40.0;
+                } else {
+                    burn.flew(0.025);
+                    left -= cell / 40.0;
+                }
+                burn.read(left as u8, FULL);
+            }
+        }
+        burn
+    }
+
+    #[test]
+    fn prices_are_learned_from_whole_percents() {
+        for (cell, hover_slot) in [(1.5, 0.5), (1.2, 0.6), (2.5, 0.4), (0.8, 0.3)] {
+            let (learned_cell, learned_hover) = fly(cell, hover_slot, 30).learned();
+            assert!((learned_cell - cell).abs() < 0.12 * cell, "{learned_cell} for {cell}");
+            assert!((learned_hover - hover_slot / 0.5).abs() < 0.4, "{learned_hover} for {hover_slot}");
+        }
+    }
+
+    #[test]
+    fn the_price_never_falls_below_nominal() {
+        assert_eq!(Burn::new().price(2.0), 1.0);
+        assert_eq!(Burn::new().price(6.7), 1.0, "nothing learned yet");
+        assert_eq!(fly(0.98, 0.32, 40).price(2.0), 1.0);
+        let windy = fly(1.5, 0.6, 40).price(2.0);
+        assert!((1.45..1.75).contains(&windy), "{windy}");
+    }
+
+    #[test]
+    fn jumps_teach_nothing() {
+        let mut burn = fly(1.0, 0.5, 30);
+        let before = burn.learned();
+        assert_eq!(burn.read(40, FULL), Reading::Jump);
+        assert_eq!(burn.read(60, FULL), Reading::Jump);
+        assert_eq!(burn.read(60, FULL), Reading::Same);
+        burn.flew(5.0);
+        assert_eq!(burn.read(59, FULL), Reading::Step);
+        assert_eq!(burn.learned(), before, "the interval after a jump has no exact start");
+    }
+}

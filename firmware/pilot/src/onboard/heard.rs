@@ -1,0 +1,64 @@
+//! What the radio reported of the mission's devices.
+
+use crate::{DeviceSite, Devices, MAX_DEVICES, RadioActivity};
+use gleaner_policy::DeviceState;
+use gleaner_radio::{Applied, DeviceTable, Report, ReportDecoder};
+use gleaner_units::{Duration, Instant};
+
+/// The radio's port and the table of devices behind it.
+pub(super) struct Heard {
+    pub(super) decoder: ReportDecoder,
+    pub(super) table: DeviceTable<MAX_DEVICES>,
+    activity: RadioActivity,
+}
+
+impl Heard {
+    pub(super) const fn new() -> Heard {
+        let activity = RadioActivity { heard_at: None, bytes: 0, reports: 0 };
+        Heard { decoder: ReportDecoder::new(), table: DeviceTable::empty(), activity }
+    }
+
+    pub(super) fn receive(&mut self, now: Instant, bytes: &[u8]) {
+        let Heard { decoder, table, activity } = self;
+        let count = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+        activity.bytes = activity.bytes.saturating_add(count);
+        decoder.push(bytes, |report| apply(now, &report, table, activity));
+    }
+
+    pub(super) fn report(&mut self, now: Instant, report: &Report) {
+        apply(now, report, &mut self.table, &mut self.activity);
+    }
+
+    pub(super) const fn activity(&self) -> RadioActivity {
+        self.activity
+    }
+
+    /// The devices with reports older than `max_age` masked.
+    pub(super) const fn at(&self, now: Instant, max_age: Duration) -> Aged<'_> {
+        Aged { table: &self.table, now, max_age }
+    }
+}
+
+fn apply(now: Instant, report: &Report, table: &mut DeviceTable<MAX_DEVICES>, activity: &mut RadioActivity) {
+    activity.reports = activity.reports.saturating_add(1);
+    if let Applied::Updated(_) = table.apply(now, report) {
+        activity.heard_at = Some(now);
+    }
+}
+
+/// The devices at one moment.
+pub(super) struct Aged<'a> {
+    table: &'a DeviceTable<MAX_DEVICES>,
+    now: Instant,
+    max_age: Duration,
+}
+
+impl Devices for Aged<'_> {
+    fn state(&self, index: usize, site: &DeviceSite) -> DeviceState {
+        DeviceState {
+            cell: site.cell,
+            remaining: self.table.remaining(index).unwrap_or(site.data),
+            snr: self.table.snr(index, self.now, self.max_age),
+        }
+    }
+}

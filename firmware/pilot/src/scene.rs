@@ -1,0 +1,59 @@
+//! Everything that a state looks at in one poll.
+
+use crate::{Inputs, Mission, Vehicle};
+use gleaner_guard::Guard;
+use gleaner_policy::Preference;
+use gleaner_units::{Cell, Duration, GridFrame, Instant};
+
+/// The facts of one poll.
+#[derive(Clone, Copy)]
+pub(crate) struct Scene<'a> {
+    pub(crate) now: Instant,
+    pub(crate) mission: &'a Mission,
+    pub(crate) guard: &'a Guard,
+    pub(crate) inputs: &'a Inputs<'a>,
+    /// Heartbeats that arrived up to here may be old: they waited in a queue while the program did not run.
+    pub(crate) evidence_from: Option<Instant>,
+    /// Whether this poll came too late after the last one.
+    pub(crate) late: bool,
+}
+
+impl<'a> Scene<'a> {
+    pub(crate) fn vehicle(&self) -> &'a Vehicle {
+        self.inputs.vehicle
+    }
+
+    /// Whether heartbeats are evidence again after a late poll.
+    pub(crate) fn hears(&self) -> bool {
+        let at = self.vehicle().heartbeat_at;
+        at.is_some_and(|at| self.evidence_from.is_none_or(|from| at > from))
+    }
+
+    /// Whether a heartbeat that arrived after `reason` shows that the aircraft is ours: armed and in GUIDED or OFFBOARD.
+    /// Nothing that moves the aircraft is requested without it.
+    pub(crate) fn is_ours_since(&self, reason: Instant) -> bool {
+        let vehicle = self.vehicle();
+        let heard_since = vehicle.heartbeat_at.is_some_and(|at| at > reason);
+        heard_since && self.hears() && vehicle.armed && vehicle.is_guided() && !self.inputs.other_mode_seen
+    }
+
+    /// The operator's preference.
+    pub(crate) fn preference(&self) -> Preference {
+        // The parameter's range is the preference's.
+        Preference::new(self.inputs.parameters.data_weight()).unwrap_or(Preference::ENERGY)
+    }
+
+    /// The time that a move takes at `GLN_SPEED`, and that a hover lasts.
+    pub(crate) fn slot(&self) -> Duration {
+        Duration::from_secs_f32(self.mission.grid().cell().0 / self.inputs.parameters.speed().0)
+    }
+
+    /// The cell under the aircraft and its offset from the centre in metres, when both are known.
+    pub(crate) fn cell_under(&self) -> Option<(Cell, f32)> {
+        let vehicle = self.vehicle();
+        let frame = GridFrame::new(self.mission.grid(), self.mission.corner, vehicle.origin?);
+        let position = vehicle.position?;
+        let cell = frame.cell(&position)?;
+        Some((cell, position.horizontal_distance(&frame.centre(cell, position.down_m)).0))
+    }
+}

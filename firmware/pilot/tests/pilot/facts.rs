@@ -1,0 +1,203 @@
+//! What was true at engage is watched in flight: origin, altitude, place, battery, radio.
+
+use crate::rig::{CORNER, Rig, TERMINAL};
+use gleaner_link::{AutopilotCommand, FlightMode};
+use gleaner_pilot::{Fault, Request, ReturnReason, State};
+use gleaner_units::{Action, BatteryUnits, Cell, Metres};
+
+#[test]
+fn an_origin_that_moves_is_a_fault() {
+    for (moved_m, is_fault) in [(0.02, false), (5.0, true)] {
+        let mut rig = Rig::engaged();
+        rig.run(2.0);
+        rig.vehicle.origin = Some(CORNER.offset_by(Metres(-100.0 + moved_m), Metres(50.0)));
+        rig.run(0.1);
+        assert_eq!(rig.machine.fault(), is_fault.then_some(Fault::OriginMoved));
+        assert_eq!(rig.said("origin moved"), usize::from(is_fault));
+    }
+}
+
+#[test]
+fn an_altitude_that_is_lost_for_three_seconds_is_a_fault() {
+    let mut rig = Rig::engaged();
+    rig.run(2.0);
+    rig.obeys = false;
+    let sink = |rig: &mut Rig, metres: f32| rig.vehicle.position.as_mut().unwrap().down_m += metres;
+    sink(&mut rig, 6.0);
+    rig.run(2.5);
+    sink(&mut rig, -6.0);
+    rig.run(2.5);
+    assert_eq!(rig.state(), State::Engaged, "a gust");
+    sink(&mut rig, 55.0);
+    rig.run(3.2);
+    assert_eq!(rig.machine.fault(), Some(Fault::AltitudeLost));
+}
+
+#[test]
+fn roofs_within_the_altitude_tolerance_refuse_a_start() {
+    let mut mission = crate::rig::mission();
+    mission.heights.set(Cell::new(4, 4), 58);
+    let mut rig = Rig::with(mission, true);
+    rig.request = Some(Request::Engage);
+    rig.run(3.0);
+    assert_eq!(rig.said("GLN_ALT is below the buildings"), 1);
+}
+
+#[test]
+fn a_position_that_jumps_goes_home_and_gives_up_the_second_time() {
+    let mut rig = Rig::engaged();
+    rig.policy.then = Action::North;
+    rig.run(3.0);
+    rig.place(Cell::new(4, 2), 3.0);
+    rig.step();
+    assert_eq!(rig.machine.return_reason(), Some(ReturnReason::PositionJump));
+    assert_eq!(rig.machine.target(), Some(Cell::new(4, 2)), "from the cell under the aircraft");
+    rig.run(2.0);
+    rig.place(Cell::new(1, 1), 0.0);
+    rig.step();
+    assert_eq!(rig.machine.fault(), Some(Fault::PositionLost));
+}
+
+#[test]
+fn an_unknown_battery_goes_home_and_a_jump_is_reported() {
+    let mut rig = Rig::engaged();
+    rig.run(1.0);
+    rig.vehicle.battery_percent = Some(70);
+    rig.run(1.0);
+    assert_eq!((rig.state(), rig.said("percentage jumped")), (State::Engaged, 1));
+    rig.vehicle.battery_percent = None;
+    rig.run(1.0);
+    assert_eq!(rig.machine.return_reason(), Some(ReturnReason::BatteryUnknown));
+    rig.run_to(State::Done);
+}
+
+#[test]
+fn a_second_engagement_does_not_reopen_the_budget() {
+    let mut rig = Rig::engaged();
+    rig.run(9.0);
+    let spent = rig.machine.spent();
+    assert!(spent.0 >= 2.0);
+    rig.vehicle.mode = Some(FlightMode::Hold);
+    rig.run(1.0);
+    rig.vehicle.mode = Some(FlightMode::Guided);
+    rig.engage();
+    let asked = rig.policy.asked.len();
+    rig.run(1.0);
+    assert_eq!(rig.policy.asked[asked].uav[1], 30.0 - spent.0);
+    // Another arming is another mission.
+    rig.vehicle.armed = false;
+    rig.run(1.0);
+    rig.vehicle.armed = true;
+    rig.run(1.0);
+    rig.engage();
+    let asked = rig.policy.asked.len();
+    rig.run(1.0);
+    assert_eq!(rig.policy.asked[asked].uav[1], 30.0);
+}
+
+/// Flies a mission in which a unit really takes `price` percent; the percent left when the landing is requested.
+fn fly_at(price: f32, then: Action) -> (Rig, f32) {
+    let mut mission = crate::rig::mission();
+    mission.budget = BatteryUnits(80.0);
+    let mut rig = Rig::with(mission, true);
+    let mut left = 90.9_f32;
+    rig.vehicle.battery_percent = Some(90);
+    rig.engage();
+    rig.policy.then = then;
+    while rig.commanded(AutopilotCommand::Land) == 0 && left > 0.0 {
+        // 20 polls a second; a cell takes two seconds.
+        let moves = rig.actions.last().is_some_and(|&action| action != Action::Hover);
+        left -= price * if moves { 1.0 } else { 0.5 } / 40.0;
+        rig.vehicle.battery_percent = Some(left.max(0.0) as u8);
+        rig.step();
+    }
+    (rig, left)
+}
+
+#[test]
+fn the_price_of_a_unit_is_learned_and_the_landing_stays_covered() {
+    let landing = 60.0 / 1.05 * 0.225;
+    for price in [0.7, 1.0, 1.3, 1.7, 2.0, 2.5] {
+        for then in [Action::Hover, Action::North, Action::West] {
+            let (rig, left) = fly_at(price, then);
+            // 2 units of reserve cover the whole percent that the charge is rounded by.
+            assert!(left >= landing * price.max(1.0), "{left} left at {price} %, {then:?}, {:?}", rig.texts);
+            assert_eq!(rig.machine.target(), Some(TERMINAL));
+        }
+    }
+}
+
+#[test]
+fn telemetry_shows_the_learned_price_and_the_charge_at_touchdown() {
+    let (rig, left) = fly_at(1.5, Action::North);
+    let told = rig.telemetry.unwrap();
+    assert!((told.unit_pct - 1.5).abs() < 0.2, "{}", told.unit_pct);
+    let landing = 60.0 / 1.05 * 0.225 * 1.5;
+    assert!((told.land_pct.unwrap() - (left - landing)).abs() < 4.0, "{told:?}");
+    assert!(rig.said("touchdown at") == 1, "{:?}", rig.texts);
+}
+
+#[test]
+fn a_battery_that_is_short_of_home_is_reported_and_lands_on_open_ground() {
+    let mut rig = Rig::engaged();
+    rig.policy.then = Action::West;
+    rig.run(1.0);
+    rig.request = Some(Request::Return);
+    rig.run(1.0);
+    rig.vehicle.battery_percent = Some(17);
+    rig.run(4.0);
+    assert_eq!((rig.state(), rig.said("battery short of home")), (State::Homing, 1));
+    assert_eq!(rig.commanded(AutopilotCommand::Land), 0, "it goes on");
+    rig.vehicle.battery_percent = Some(13);
+    rig.run(6.0);
+    assert_eq!((rig.commanded(AutopilotCommand::Land), rig.said("battery empty, landing")), (1, 1));
+}
+
+#[test]
+fn a_silent_radio_is_reported_and_then_goes_home() {
+    let mut rig = Rig::engaged();
+    rig.run(5.0);
+    rig.radio_reports = false;
+    rig.run(10.5);
+    assert_eq!((rig.state(), rig.said("radio silent, 0 bytes 0 reports")), (State::Engaged, 1));
+    rig.radio_reports = true;
+    rig.run(1.0);
+    rig.radio_reports = false;
+    rig.run(30.0);
+    assert_eq!((rig.state(), rig.said("bytes 0 reports")), (State::Engaged, 2), "once each time");
+}
+
+#[test]
+fn a_flight_without_reports_ends_after_the_set_time() {
+    let mut mission = crate::rig::mission();
+    mission.budget = BatteryUnits(70.0);
+    let mut rig = Rig::with(mission, true);
+    rig.radio_reports = false;
+    rig.engage();
+    rig.run(61.0);
+    assert_eq!(rig.machine.return_reason(), Some(ReturnReason::RadioSilent));
+}
+
+#[test]
+fn an_altitude_changed_in_flight_acts_at_the_next_engage() {
+    let mut rig = Rig::new();
+    rig.set("GLN_ALT", 61.0);
+    rig.run(1.0);
+    assert_eq!(rig.said("GLN_ALT acts"), 0);
+    rig.engage();
+    rig.set("GLN_ALT", 62.0);
+    rig.run(3.0);
+    assert_eq!(rig.said("GLN_ALT acts at the next engage"), 1);
+}
+
+#[test]
+fn a_vehicle_clock_that_runs_fast_is_reported_once() {
+    for (factor, reported) in [(1, 0), (4, 1)] {
+        let mut rig = Rig::new();
+        for step in 0..600_u32 {
+            rig.vehicle.boot_ms = Some(step * 50 * factor);
+            rig.step();
+        }
+        assert_eq!(rig.said("vehicle clock at"), reported);
+    }
+}
