@@ -14,13 +14,13 @@ const RANKS: [(&str, u8); 14] = [
     ("firmware/link", 1),
     ("firmware/radio", 1),
     ("firmware/pilot", 2),
-    ("firmware/dashboard", 2),
-    ("firmware/companion", 3),
-    ("firmware/cortex-m", 3),
+    ("firmware/dashboard", 3),
+    ("firmware/companion", 4),
+    ("firmware/cortex-m", 4),
     ("sitl/world", 1),
-    ("sitl/harness", 3),
-    ("host-trainer", 3),
-    ("tests", 4),
+    ("sitl/harness", 4),
+    ("host-trainer", 4),
+    ("tests", 5),
 ];
 
 /// Every dependency between members, as folders: (dependent, dependency). Those of tests and benches count too.

@@ -59,7 +59,12 @@ impl Dashboard {
 
     /// Publishes what is due, and takes orders. Returns frames of the page's ground station for the pilot: hand them to
     /// [`Onboard::receive_link`].
-    pub fn poll<P: Policy>(&mut self, wall: time::Instant, now: Instant, onboard: &Onboard<P>) -> Vec<Vec<u8>> {
+    pub fn poll<P: Policy>(
+        &mut self,
+        wall: time::Instant,
+        now: Instant,
+        onboard: &Onboard<P>,
+    ) -> Vec<Vec<u8>> {
         self.now_s = now.as_micros() as f64 * 1e-6;
         if wall >= self.next_live {
             self.next_live = wall + LIVE_INTERVAL;
@@ -174,10 +179,11 @@ fn live<P: Policy>(t_s: f64, now: Instant, onboard: &Onboard<P>, telemetry: Tele
         spare_units: telemetry.spare_units,
         battery_pct: vehicle.battery_percent.map(f32::from),
         land_pct: telemetry.land_pct,
-        w_data: onboard.parameters().preference().w_data(),
+        w_data: onboard.parameters().data_weight(),
         collected: stats.collected,
         devices: onboard
             .device_states(now)
+            .iter()
             .map(|device| DeviceState {
                 remaining: device.remaining,
                 snr_db: device.snr.map(|snr| snr.0),
@@ -197,7 +203,7 @@ pub fn shown(decision: &gleaner_pilot::Decision) -> Decision {
         sequence: decision.sequence,
         cell: [decision.cell.x, decision.cell.y],
         action: decision.action.name().into(),
-        allowed: Action::ALL.map(|action| decision.mask.contains(action)),
+        allowed: Action::ALL.map(|action| decision.mask.allows(action)),
         probabilities: inference.map(|inference| probabilities(&inference.logits, decision.mask)),
         attention: inference.map(|inference| {
             let rows = inference.attention.0.iter().take(tokens);
@@ -212,7 +218,7 @@ pub fn shown(decision: &gleaner_pilot::Decision) -> Decision {
 fn probabilities(logits: &[f32; Action::COUNT], mask: ActionMask) -> [f32; Action::COUNT] {
     let highest = mask.iter().map(|action| logits[action.index()]).fold(f32::NEG_INFINITY, f32::max);
     let weight = |action: Action| {
-        if mask.contains(action) { (logits[action.index()] - highest).exp() } else { 0.0 }
+        if mask.allows(action) { (logits[action.index()] - highest).exp() } else { 0.0 }
     };
     let sum: f32 = Action::ALL.into_iter().map(weight).sum();
     Action::ALL.map(|action| if sum > 0.0 { weight(action) / sum } else { 0.0 })

@@ -33,6 +33,7 @@ mod server;
 mod words;
 
 pub use access::{Access, AccessError, Token};
+pub use dashboard::{Dashboard, scene, shown};
 pub use flight::{
     Decision, Device, DeviceState, Event, Flight, Grid, Live, Scene, Text, WhatIf, WhatIfOption,
 };

@@ -12,13 +12,15 @@ pub use settings::{OnboardError, Settings};
 use self::heard::Heard;
 use self::rc::Knob;
 use self::recall::Recall;
-use crate::exchange::collected;
-use crate::{Decision, Fault, Inputs, Machine, Missing, Mission, ReturnReason, Rules, State, Vehicle};
+use crate::exchange::{collected, device_states};
+use crate::{
+    Decision, Fault, Inputs, MAX_DEVICES, Machine, Missing, Mission, ReturnReason, Rules, State, Vehicle,
+};
 use core::fmt;
 use gleaner_link::{
     AutopilotCommand, Component, Enable, LinkStats, ParameterId, Parameters, Severity, Status,
 };
-use gleaner_policy::{Policy, SelfTestError};
+use gleaner_policy::{DeviceState, Policy, SelfTestError};
 use gleaner_radio::ReportStats;
 use gleaner_units::{BatteryUnits, Cell, Duration, Instant};
 use heapless::Vec;
@@ -245,6 +247,13 @@ impl<P: Policy> Onboard<P> {
             tunnel_refused: self.tunnel_refused,
             unknown_reports: self.heard.table.unknown_reports(),
         }
+    }
+
+    /// The devices of the mission, in its order, as the next decision would see them.
+    #[must_use]
+    pub fn device_states(&self, now: Instant) -> Vec<DeviceState, MAX_DEVICES> {
+        let heard = self.heard.at(now, self.link.parameters().snr_age());
+        device_states(self.machine.mission(), &heard).collect()
     }
 
     /// The parameters as they are now.
