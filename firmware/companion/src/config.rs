@@ -254,7 +254,10 @@ GLN_ALT = 75.5
         assert_eq!(config.engine, EngineKind::Tract);
         assert_eq!(config.mission, Path::new("/etc/gleaner/missions/city.toml"));
         assert_eq!(config.log_dir.as_deref(), Some(Path::new("/var/log/gleaner")));
-        assert_eq!(config.settings, Settings { system_id: Some(7), component_id: 192, ..Settings::default() });
+        assert_eq!(
+            config.settings,
+            Settings { system_id: Some(7), component_id: 192, ..Settings::default() }
+        );
         assert_eq!(config.parameters.altitude().0, 75.5);
         let setup = Setup {
             model: Some("other.onnx".into()),
