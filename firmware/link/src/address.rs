@@ -1,6 +1,8 @@
-//! Who speaks and who is spoken to.
+//! Addresses of senders and receivers.
 
-/// A MAVLink address. In a target, 0 stands for all systems or all components.
+use core::fmt;
+
+/// A MAVLink address, written `SYSTEM/COMPONENT`. In a target, 0 stands for all systems or all components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Address {
     /// System id: one vehicle or one ground station.
@@ -10,7 +12,7 @@ pub struct Address {
 }
 
 impl Address {
-    /// Everyone.
+    /// All components of all systems.
     pub const ALL: Address = Address { system: 0, component: 0 };
 
     /// The address with these ids.
@@ -28,12 +30,18 @@ impl Address {
     }
 }
 
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.system, self.component)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_target_reaches_us_by_broadcast_by_system_and_by_name() {
+    fn broadcast_system_and_exact_targets_reach_us() {
         let own = Address::new(7, 191);
         for target in [Address::ALL, Address::new(7, 0), Address::new(7, 191), Address::new(0, 191)] {
             assert!(target.reaches(own), "{target:?}");

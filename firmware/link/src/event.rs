@@ -1,46 +1,80 @@
-//! What a component tells its owner.
+//! What a component reports to its owner.
 
-use crate::{AutopilotCommand, Change, Failsafe, FlightMode, OperatorRequest, Outcome};
+use crate::autopilot_command::AutopilotCommand;
+use crate::message::CommandResult;
+use crate::mode::FlightMode;
+use crate::parameters::{Change, Enable};
 use heapless::{Deque, Vec};
 
-pub(crate) const TUNNEL_BYTES: usize = 128;
+/// Bytes of a radio report; the longest has 19.
+pub type ReportBytes = Vec<u8, 24>;
 
-/// Payload of a `TUNNEL` message.
-pub type TunnelPayload = Vec<u8, TUNNEL_BYTES>;
+/// A request of an operator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OperatorRequest {
+    /// Weight of data in the preference, 0..1.
+    SetPreference(f32),
+    /// Off, engage or shadow. A command that asks for the state in force is a new request.
+    Enable(Enable),
+    /// Fly home now.
+    ReturnNow,
+}
 
-/// Something that happened, in the order in which it did.
+/// Failsafe that the autopilot reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failsafe {
+    /// The heartbeat's system status is critical or worse.
+    System,
+    /// A battery is low or worse. ArduPilot keeps it until the battery is changed.
+    Battery,
+}
+
+/// How a command of ours to the autopilot ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The autopilot accepted.
+    Accepted,
+    /// The autopilot refused.
+    Refused(CommandResult),
+    /// No acknowledgement after three transmissions.
+    NoAnswer,
+    /// A newer request of the same kind replaced it.
+    Superseded,
+}
+
+/// Something that happened. Events are in the order in which they happened.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// The operator asked for something, by command or by the parameter that means the same. Already
-    /// acknowledged and already in [`crate::Parameters`].
+    /// An operator's request, by command or by the parameter that means the same. It is already acknowledged and
+    /// already in [`crate::Parameters`].
     Operator(OperatorRequest),
-    /// A parameter without an operator request of its own was set.
+    /// A parameter without a request of its own was set.
     Parameter(Change),
     /// The first heartbeat of the autopilot, or the first after it was lost.
     AutopilotConnected,
     /// No heartbeat of the autopilot for five seconds.
     AutopilotLost,
-    /// The autopilot's clock went back: it started again, and everything known of it was forgotten.
+    /// The autopilot's clock went back: it restarted, and everything known of it was forgotten.
     AutopilotRebooted,
     /// The autopilot reports another mode (also the first one after it connected).
     ModeChanged(FlightMode),
     /// The motors were armed or disarmed (also the first report).
     ArmedChanged(bool),
-    /// A failsafe of the autopilot began. None is reported for its end.
+    /// A failsafe of the autopilot began. Its end is not reported.
     FailsafeBegan(Failsafe),
-    /// A command of ours to the autopilot came to its end.
+    /// A command of ours to the autopilot ended.
     RequestEnded {
-        /// What was asked.
+        /// The command.
         command: AutopilotCommand,
         /// How it ended.
         outcome: Outcome,
     },
-    /// Bytes of a radio report ([`crate::TUNNEL_RADIO_REPORT`]).
-    RadioReport(TunnelPayload),
+    /// Bytes of a radio report ([`crate::TUNNEL_RADIO_REPORT`]) from the vehicle or from an operator.
+    RadioReport(ReportBytes),
 }
 
-/// Events not yet taken. Radio reports may take half of the room only, so that a flood of them never costs an
-/// operator's request.
+/// Events that the owner has not taken. Radio reports may fill half of the queue, so that a flood of them leaves room
+/// for operators' requests.
 #[derive(Debug, Default)]
 pub(crate) struct Events {
     queue: Deque<Event, 24>,
@@ -48,7 +82,7 @@ pub(crate) struct Events {
 }
 
 impl Events {
-    /// Room that every batch of consequences of one message fits in.
+    /// Room for all consequences of one message.
     const MARGIN: usize = 6;
 
     pub fn push(&mut self, event: Event) {
@@ -65,7 +99,7 @@ impl Events {
         self.queue.pop_front()
     }
 
-    /// Whether the consequences of one more operator message surely fit.
+    /// Whether the consequences of one more operator message fit.
     pub fn has_room(&self) -> bool {
         self.queue.len() + Events::MARGIN <= self.queue.storage_capacity()
     }

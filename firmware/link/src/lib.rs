@@ -1,33 +1,37 @@
 //! MAVLink without I/O: bytes to messages, and the services of one component.
 //!
 //! # What it owns
-//! The wire: framing, checksums, scaling. The manners of a MAVLink component: identity, heartbeat, parameters,
-//! commands and their acknowledgements, status texts. And what is known of the one autopilot on the other end.
-//! It does not own any decision about the flight: [`Component`] tells what the operator and the autopilot said,
-//! and sends what it is told to send.
+//! The wire: framing, checksums, signatures, scaling. The services of a MAVLink component: identity, heartbeat,
+//! parameters, commands and their acknowledgements, status texts, metadata. The state of the one autopilot that it
+//! serves. It makes no decision about the flight: [`Component`] reports what operators and autopilot sent, and sends
+//! what its owner gives it.
 //!
 //! # Glossary
-//! - **frame**: one packet on the wire, checksum verified, payload still bytes ([`Frame`]).
-//! - **message**: what a frame says, in our units ([`Message`]).
+//! - **frame**: one packet on the wire with a correct checksum; its payload is still bytes ([`Frame`]).
+//! - **message**: the content of a frame, in our units ([`Message`]).
 //! - **address**: system id and component id ([`Address`]); 0 stands for all of them.
-//! - **autopilot**: the one flight controller that this component serves ([`Autopilot`]).
-//! - **setpoint**: a position target; only the newest counts, so an unsent one is replaced.
+//! - **autopilot**: the flight controller that this component serves ([`Autopilot`]).
+//! - **operator**: a ground station that may command ([`Operators`]).
+//! - **setpoint**: a position target; only the newest counts, so one that has not left is replaced.
 //! - **request**: a command of ours to the autopilot, repeated until it is acknowledged ([`AutopilotCommand`]).
-//! - **operator request**: what a person asked of us ([`OperatorRequest`]).
+//! - **operator request**: a command of an operator to us ([`OperatorRequest`]).
 //!
 //! # When you may trust what
-//! - A [`Frame`] has a correct checksum for a message that the dialect knows. Bytes that are not a frame are
-//!   counted by reason in [`DecodeStats`] and never end a later frame. Signatures are not verified.
-//! - A [`Message`] has finite coordinates and a latitude and longitude that exist; anything else was refused
-//!   and counted here. The parameters of a [`Command`] are as they came, NaN included.
-//! - Everything that [`Autopilot`] tells came from the adopted autopilot, and is forgotten when that one
-//!   reboots or was lost. Ask with an age where age matters.
-//! - There is no way to ask the autopilot for a mode in which we steer: only the pilot of the aircraft or the
-//!   operator can give control, by design.
+//! - A [`Frame`] has a correct checksum for a message of the dialect. Other bytes are counted by reason. A frame inside
+//!   the payload of another frame is data: see [`FrameDecoder`].
+//! - [`Component`] does not verify signatures. On a port that needs them, the program passes on only frames that
+//!   [`Signing::check`] accepted.
+//! - A [`Message`] has finite coordinates and a latitude and longitude that exist. The parameters of a [`Command`] are
+//!   as sent, NaN included.
+//! - Everything in [`Autopilot`] was sent by the served autopilot, and is forgotten when that one restarts or is lost.
+//!   Ask with a maximum age where age matters.
+//! - Nothing engages or moves the aircraft unless an operator on the allow-list names our exact system and component.
+//! - There is no command to the autopilot for a mode in which we steer: only the pilot of the aircraft or the operator
+//!   can give us control.
 //!
 //! # Time
-//! `now` is an argument and must not go backwards. The heartbeat leaves only from [`Component::poll`]: when
-//! the caller's decision loop stops, the heartbeat stops with it.
+//! `now` is an argument and must not go backwards. The heartbeat leaves only from [`Component::poll`]: when the
+//! caller's decision loop stops, the heartbeat stops with it.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -39,7 +43,7 @@
 #[cfg(test)]
 extern crate std;
 
-/// The same cases in every run.
+/// Fixed seed for property tests.
 #[cfg(test)]
 fn seeded() -> proptest::test_runner::Config {
     use proptest::test_runner::{Config, RngSeed};
@@ -47,40 +51,46 @@ fn seeded() -> proptest::test_runner::Config {
 }
 
 mod address;
-mod autopilot;
-mod commands;
+mod autopilot_command;
 mod component;
 mod event;
 mod fields;
-mod frame;
-mod identity;
 mod message;
+pub mod metadata;
 mod mode;
-mod outgoing;
-mod parameter_service;
+mod operators;
 mod parameters;
-mod requests;
+mod service;
 mod setpoint;
-mod steering;
-mod streams;
-mod text;
+mod settings;
+mod signing;
+mod telemetry;
+mod wire;
 
 pub use address::Address;
-pub use autopilot::{Autopilot, Failsafe};
-pub use commands::OperatorRequest;
-pub use component::{Component, LinkStats, NotSent, Settings, SettingsError, Status};
-pub use event::{Event, TunnelPayload};
-pub use frame::{DecodeStats, Frame, FrameDecoder, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, WireVersion};
+pub use autopilot_command::AutopilotCommand;
+pub use component::Component;
+pub use event::{Event, Failsafe, OperatorRequest, Outcome, ReportBytes};
 pub use message::{
     BatteryStatus, ChargeState, Command, CommandAck, CommandForm, CommandResult, FollowedTarget,
     GlobalOrigin, GlobalPosition, Heartbeat, HomePosition, LandedState, LocalPosition, Message, MessageFault,
-    ParameterKey, ParameterName, RcChannels, Severity, SysStatus, SystemState, Velocity,
+    ParameterKey, ParameterName, RcChannels, Severity, SysStatus, SystemState, TunnelPayload, Velocity,
 };
-pub use mode::{Firmware, FlightMode};
-pub use outgoing::{FrameBytes, Outgoing, OutgoingStats, Packet, Priority};
+pub use mode::{Firmware, FlightMode, is_multirotor};
+pub use operators::{Operator, OperatorSyntax, Operators};
 pub use parameters::{Change, Enable, PARAMETERS, ParameterError, ParameterId, ParameterSpec, Parameters};
-pub use requests::{AutopilotCommand, Outcome};
+pub use service::autopilot::Autopilot;
 pub use setpoint::{PositionTarget, TargetError};
+pub use settings::{EngageBlock, LinkStats, NotSent, Settings, SettingsError, Status};
+pub use signing::{
+    SignedFrameBytes, Signing, SigningFault, SigningKey, SigningState, SigningStats, SigningTime, StateError,
+    may_forward,
+};
+pub use telemetry::Telemetry;
+pub use wire::decoder::{DecodeStats, FrameDecoder};
+pub use wire::frame::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, SIGNATURE_BYTES, WireVersion};
+pub use wire::outgoing::{Outgoing, OutgoingStats, Priority};
+pub use wire::packet::{FrameBytes, Packet};
 
 /// `TUNNEL` payload type of a radio report (postcard, as on the serial port). Above 32767: local use.
 pub const TUNNEL_RADIO_REPORT: u16 = 40_000;

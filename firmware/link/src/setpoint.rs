@@ -1,12 +1,14 @@
 //! Position targets.
 
-use crate::{Address, Packet, Velocity};
+use crate::address::Address;
+use crate::message::Velocity;
+use crate::wire::packet::Packet;
 use gleaner_units::{Instant, Ned};
 use mavlink::dialects::ardupilotmega::{
     MavFrame, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 
-/// Where to fly: a point of the local frame, and the velocity on the way if a steady stream follows.
+/// A point of the local frame to fly to, and the velocity on the way if a steady stream follows.
 ///
 /// ArduCopter's position-only targets never time out; with a velocity the target moves on for three seconds
 /// (`GUID_TIMEOUT`) and then stops.
@@ -21,7 +23,7 @@ pub struct PositionTarget {
 /// Why a target was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetError {
-    /// A coordinate is NaN or infinite: ArduPilot's simulation dies of it and PX4 lets go of the axis.
+    /// A coordinate is NaN or infinite. ArduPilot's simulation crashes on it; PX4 stops controlling the axis.
     NotFinite,
 }
 

@@ -1,7 +1,13 @@
-//! What we say of ourselves.
+//! Messages that we send.
 
-use super::{Component, NotSent};
-use crate::{Address, Command, CommandResult, Packet, PositionTarget, Priority, SystemState};
+use super::Component;
+use crate::address::Address;
+use crate::message::{Command, CommandResult, SystemState, TUNNEL_BYTES};
+use crate::setpoint::PositionTarget;
+use crate::settings::NotSent;
+use crate::telemetry::Telemetry;
+use crate::wire::outgoing::Priority;
+use crate::wire::packet::Packet;
 use gleaner_units::Instant;
 use heapless::Vec;
 use mavlink::MessageData;
@@ -32,7 +38,17 @@ impl Component {
         Ok(())
     }
 
-    /// Sends one number as `NAMED_VALUE_FLOAT`; the name is cut to 10 characters. Not a number is not sent.
+    /// Sends the values of one second.
+    pub fn send_telemetry(&mut self, now: Instant, telemetry: &Telemetry) {
+        for (name, value) in telemetry.values() {
+            if let Some(value) = value {
+                self.telemetry(now, name, value);
+            }
+        }
+    }
+
+    /// Sends one number as `NAMED_VALUE_FLOAT`; the name is cut to 10 characters. A value that is not finite is not
+    /// sent.
     pub fn telemetry(&mut self, now: Instant, name: &str, value: f32) {
         if value.is_finite() {
             let data =
@@ -41,14 +57,14 @@ impl Component {
         }
     }
 
-    /// Sends up to 128 bytes to everyone as `TUNNEL`; more are not sent.
+    /// Broadcasts up to 128 bytes as `TUNNEL`; a longer payload is not sent.
     pub fn tunnel(&mut self, payload_type: u16, payload: &[u8]) {
         let packet = tunnel_packet(Address::ALL, payload_type, payload);
         self.send(Priority::Bulk, packet);
     }
 
     pub(super) fn send_ack(&mut self, command: &Command, result: CommandResult) {
-        // By hand: the dialect's type cannot hold a command that it does not list.
+        // Field by field: the dialect's type cannot hold a command that it does not list.
         let [command_low, command_high] = command.id.to_le_bytes();
         let sender = command.sender;
         let payload =
@@ -90,6 +106,32 @@ impl Component {
         self.send(Priority::Urgent, Packet::new(&information));
     }
 
+    /// `COMPONENT_METADATA`, if the program has named a file.
+    pub(super) fn send_component_metadata(&mut self, now: Instant) {
+        let Some(metadata) = &self.metadata else { return };
+        let data = dialect::COMPONENT_METADATA_DATA {
+            time_boot_ms: now.as_boot_ms(),
+            file_crc: metadata.crc,
+            uri: metadata.uri.as_str().into(),
+        };
+        self.send(Priority::Urgent, Packet::new(&data));
+    }
+
+    /// Refuses a MAVLink FTP request at once, so that the ground station does not wait for a timeout.
+    pub(super) fn refuse_file_request(&mut self, to: Address, sequence: u16, session: u8, opcode: u8) {
+        const NAK: u8 = 129;
+        const UNKNOWN_COMMAND: u8 = 7;
+        let [low, high] = sequence.wrapping_add(1).to_le_bytes();
+        // Target network, system, component; then sequence, session, opcode, size, request's opcode, burst, padding,
+        // offset (4), data.
+        let (system, component) = (to.system, to.component);
+        let payload =
+            [0, system, component, low, high, session, NAK, 1, opcode, 0, 0, 0, 0, 0, 0, UNKNOWN_COMMAND];
+        let id = dialect::FILE_TRANSFER_PROTOCOL_DATA::ID;
+        let extra = dialect::FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC;
+        self.send(Priority::Bulk, Packet::from_payload(id, extra, &payload));
+    }
+
     fn send(&mut self, priority: Priority, packet: Option<Packet>) {
         if let Some(packet) = packet {
             self.outgoing.push(priority, packet);
@@ -97,14 +139,12 @@ impl Component {
     }
 }
 
-/// `TUNNEL` by hand: the dialect's type cannot hold a payload type that it does not list.
+/// `TUNNEL`, field by field: the dialect's type cannot hold a payload type that it does not list.
 fn tunnel_packet(target: Address, payload_type: u16, payload: &[u8]) -> Option<Packet> {
     const HEADER: usize = 5;
-    let length = u8::try_from(payload.len())
-        .ok()
-        .filter(|&length| usize::from(length) <= crate::event::TUNNEL_BYTES)?;
+    let length = u8::try_from(payload.len()).ok().filter(|&length| usize::from(length) <= TUNNEL_BYTES)?;
     let [type_low, type_high] = payload_type.to_le_bytes();
-    let mut bytes: Vec<u8, { HEADER + crate::event::TUNNEL_BYTES }> =
+    let mut bytes: Vec<u8, { HEADER + TUNNEL_BYTES }> =
         Vec::from_array([type_low, type_high, target.system, target.component, length]);
     bytes.extend_from_slice(payload).ok()?;
     Packet::from_payload(dialect::TUNNEL_DATA::ID, dialect::TUNNEL_DATA::EXTRA_CRC, &bytes)

@@ -1,9 +1,9 @@
 //! Commands and their acknowledgements.
 
-use crate::Address;
+use crate::address::Address;
 use crate::fields::Fields;
 
-/// Which of the two messages a command came in.
+/// The message that carried a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandForm {
     /// `COMMAND_LONG`.
@@ -12,12 +12,12 @@ pub enum CommandForm {
     Int,
 }
 
-/// A command to someone, from either message.
+/// A command, from `COMMAND_LONG` or `COMMAND_INT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
-    /// Who asks, and gets the acknowledgement.
+    /// Sender; gets the acknowledgement.
     pub sender: Address,
-    /// Who is asked.
+    /// Receiver.
     pub target: Address,
     /// `MAV_CMD`.
     pub id: u16,
@@ -25,7 +25,7 @@ pub struct Command {
     pub params: [f32; 7],
     /// 0 for the first transmission, more for a resend; always 0 in `COMMAND_INT`.
     pub confirmation: u8,
-    /// Which message it was.
+    /// The message that carried it.
     pub form: CommandForm,
 }
 
@@ -53,7 +53,7 @@ impl Command {
         }
     }
 
-    /// Whether `other` asks the same of the same by the same, bit for bit, whatever the confirmation.
+    /// Whether `other` is the same command bit for bit, except for the confirmation.
     #[must_use]
     pub fn repeats(&self, other: &Command) -> bool {
         self.sender == other.sender
@@ -67,7 +67,7 @@ impl Command {
 /// `MAV_RESULT`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandResult {
-    /// Done, or going to be done.
+    /// Accepted: done, or about to be done.
     Accepted,
     /// Not now.
     TemporarilyRejected,
@@ -77,7 +77,7 @@ pub enum CommandResult {
     Unsupported,
     /// Tried without success.
     Failed,
-    /// Being done; another acknowledgement follows.
+    /// In progress; another acknowledgement follows.
     InProgress,
     /// Cancelled.
     Cancelled,
@@ -122,7 +122,7 @@ pub struct CommandAck {
     pub command: u16,
     /// The answer.
     pub result: CommandResult,
-    /// Who had asked; [`Address::ALL`] from senders without the MAVLink 2 extension.
+    /// Sender of that command; [`Address::ALL`] from senders without the MAVLink 2 extension.
     pub target: Address,
 }
 

@@ -1,4 +1,4 @@
-//! What frames say, in our units.
+//! Messages: the content of frames, in our units.
 
 mod command;
 mod parameter;
@@ -11,13 +11,20 @@ pub use vehicle::{
     LandedState, LocalPosition, RcChannels, SysStatus, SystemState, Velocity,
 };
 
+use crate::address::Address;
 use crate::fields::Fields;
-use crate::{Address, Frame, TunnelPayload};
+use crate::wire::frame::Frame;
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega as dialect;
 use mavlink::{MavlinkVersion, MessageData};
 
-/// Text and its weight, as in `STATUSTEXT`; the order is that of RFC 5424.
+/// Payload bytes of a `TUNNEL`, at most.
+pub(crate) const TUNNEL_BYTES: usize = 128;
+
+/// Payload of a `TUNNEL` message.
+pub type TunnelPayload = Vec<u8, TUNNEL_BYTES>;
+
+/// Severity of a `STATUSTEXT`, in the order of RFC 5424.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 #[expect(missing_docs, reason = "the names are RFC 5424's")]
@@ -65,47 +72,60 @@ pub enum Message {
     CommandAck(CommandAck),
     /// `PARAM_REQUEST_LIST`.
     ParameterList {
-        /// Whom it is for.
+        /// Receiver.
         target: Address,
     },
     /// `PARAM_REQUEST_READ`.
     ParameterRead {
-        /// Whom it is for.
+        /// Receiver.
         target: Address,
-        /// Which parameter.
+        /// Name or index of the parameter.
         key: ParameterKey,
     },
     /// `PARAM_SET`; the value is as sent, NaN included.
     ParameterSet {
-        /// Whom it is for.
+        /// Receiver.
         target: Address,
-        /// Which parameter.
+        /// Name of the parameter.
         name: ParameterName,
-        /// The value asked for.
+        /// The value as sent.
         value: f32,
+        /// `MAV_PARAM_TYPE`, which decides how `value` is to be read.
+        kind: u8,
     },
     /// `STATUSTEXT`: the severity, and the text of this chunk up to its first NUL (not always UTF-8).
     StatusText {
-        /// How grave, 0 emergency .. 7 debug.
+        /// 0 emergency .. 7 debug.
         severity: u8,
         /// The chunk's bytes.
         text: Vec<u8, 50>,
     },
-    /// `TIMESYNC` request of someone who wants to compare clocks.
+    /// `TIMESYNC` request.
     TimesyncRequest {
-        /// Whom it is for.
+        /// Receiver.
         target: Address,
-        /// The asker's clock, ns, to be echoed.
+        /// The sender's clock, ns, to be echoed.
         asked_ns: i64,
     },
     /// `TUNNEL`.
     Tunnel {
-        /// Whom it is for.
+        /// Receiver.
         target: Address,
-        /// Meaning of the payload.
+        /// Type of the payload.
         payload_type: u16,
         /// The payload.
         payload: TunnelPayload,
+    },
+    /// `FILE_TRANSFER_PROTOCOL` request.
+    FileRequest {
+        /// Receiver.
+        target: Address,
+        /// Sequence number of the request.
+        sequence: u16,
+        /// Session of the request.
+        session: u8,
+        /// Operation asked for.
+        opcode: u8,
     },
 }
 
@@ -172,7 +192,7 @@ impl Message {
         Ok(Some(message))
     }
 
-    /// The messages that someone addresses to someone.
+    /// The messages that have a receiver.
     fn decode_conversation(frame: &Frame) -> Result<Option<Message>, MessageFault> {
         let fields = Fields(frame.payload());
         let message = match frame.message_id {
@@ -188,7 +208,7 @@ impl Message {
                 let sent = frame.payload().get(1..).unwrap_or(&[]);
                 let mut text = Vec::new();
                 for byte in sent.iter().copied().take(50).take_while(|&byte| byte != 0) {
-                    // It fits: 50 is its capacity.
+                    // It fits: 50 is the capacity.
                     let _ = text.push(byte);
                 }
                 Message::StatusText { severity: fields.u8(0), text }
@@ -202,12 +222,19 @@ impl Message {
                 Message::TimesyncRequest { target, asked_ns: fields.i64(8) }
             }
             dialect::TUNNEL_DATA::ID => read_tunnel(fields, frame.payload())?,
+            // Target network, system and component, then the FTP header: sequence number, session, opcode.
+            dialect::FILE_TRANSFER_PROTOCOL_DATA::ID => Message::FileRequest {
+                target: Address::new(fields.u8(1), fields.u8(2)),
+                sequence: fields.u16(3),
+                session: fields.u8(5),
+                opcode: fields.u8(6),
+            },
             _ => return Ok(None),
         };
         Ok(Some(message))
     }
 
-    /// Whom the message is for; [`Address::ALL`] when it names nobody.
+    /// Receiver of the message; [`Address::ALL`] when it names none.
     #[must_use]
     pub fn target(&self) -> Address {
         match self {
@@ -217,7 +244,8 @@ impl Message {
             | Message::ParameterRead { target, .. }
             | Message::ParameterSet { target, .. }
             | Message::TimesyncRequest { target, .. }
-            | Message::Tunnel { target, .. } => *target,
+            | Message::Tunnel { target, .. }
+            | Message::FileRequest { target, .. } => *target,
             _ => Address::ALL,
         }
     }
@@ -226,11 +254,11 @@ impl Message {
 fn read_tunnel(fields: Fields<'_>, payload: &[u8]) -> Result<Message, MessageFault> {
     const HEADER: usize = 5;
     let length = usize::from(fields.u8(4));
-    if length > crate::event::TUNNEL_BYTES {
+    if length > TUNNEL_BYTES {
         return Err(MessageFault::Malformed);
     }
     let sent = payload.get(HEADER..).unwrap_or(&[]);
-    let mut padded = crate::TunnelPayload::new();
+    let mut padded = TunnelPayload::new();
     for byte in sent.iter().copied().chain(core::iter::repeat(0)).take(length) {
         // It fits, as checked above.
         let _ = padded.push(byte);

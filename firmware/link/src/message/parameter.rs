@@ -1,14 +1,14 @@
 //! Parameter messages.
 
 use super::{Message, MessageFault};
-use crate::Address;
+use crate::address::Address;
 use crate::fields::Fields;
 use heapless::String;
 
 /// Name of a parameter: up to 16 characters, no NUL.
 pub type ParameterName = String<16>;
 
-/// How a parameter is asked for.
+/// Name or index in `PARAM_REQUEST_READ`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ParameterKey {
     /// By its index.
@@ -43,5 +43,6 @@ pub(super) fn read_set(fields: Fields<'_>, payload: &[u8]) -> Result<Message, Me
         target: Address::new(fields.u8(4), fields.u8(5)),
         name: name(payload, 6)?,
         value: fields.f32(0),
+        kind: fields.u8(22),
     })
 }

@@ -1,4 +1,4 @@
-//! What the autopilot tells of itself and of the vehicle.
+//! State of the autopilot and of the vehicle.
 
 use super::MessageFault;
 use crate::fields::Fields;
@@ -77,7 +77,7 @@ impl Heartbeat {
     }
 }
 
-/// `SYS_STATUS`, the part of use.
+/// `SYS_STATUS`, the fields that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SysStatus {
     /// Sensors that are enabled (`MAV_SYS_STATUS_SENSOR`).
@@ -99,7 +99,7 @@ impl SysStatus {
     }
 }
 
-/// -1 and anything else outside 0..100 is "not known".
+/// -1 and other values outside 0..100 mean "unknown".
 fn percent(value: i8) -> Option<u8> {
     u8::try_from(value).ok().filter(|&percent| percent <= 100)
 }
@@ -107,7 +107,7 @@ fn percent(value: i8) -> Option<u8> {
 /// `MAV_BATTERY_CHARGE_STATE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChargeState {
-    /// Not told.
+    /// Not reported.
     Unknown,
     /// Not low.
     Ok,
@@ -146,14 +146,14 @@ impl ChargeState {
     }
 }
 
-/// `BATTERY_STATUS`, the part of use.
+/// `BATTERY_STATUS`, the fields that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BatteryStatus {
-    /// Which battery; 0 is the main one.
+    /// Battery number; 0 is the main one.
     pub id: u8,
     /// Left, percent.
     pub remaining_percent: Option<u8>,
-    /// The autopilot's judgement.
+    /// Charge state as the autopilot judges it.
     pub charge: ChargeState,
     /// Drawn since the start, mAh.
     pub consumed_mah: Option<u32>,
@@ -197,9 +197,9 @@ impl Velocity {
 pub struct LocalPosition {
     /// The autopilot's time since it started, ms.
     pub time_boot_ms: u32,
-    /// Where.
+    /// Position.
     pub position: Ned,
-    /// How fast.
+    /// Velocity.
     pub velocity: Velocity,
 }
 
@@ -226,7 +226,7 @@ fn geo_point(lat_deg_e7: i32, lon_deg_e7: i32) -> Result<GeoPoint, MessageFault>
 pub struct GlobalPosition {
     /// The autopilot's time since it started, ms.
     pub time_boot_ms: u32,
-    /// Where.
+    /// Position.
     pub point: GeoPoint,
     /// Above mean sea level, mm.
     pub altitude_amsl_mm: i32,
@@ -294,7 +294,7 @@ impl FollowedTarget {
 /// `HOME_POSITION`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HomePosition {
-    /// Where.
+    /// Position.
     pub point: GeoPoint,
     /// Above mean sea level, mm.
     pub altitude_amsl_mm: i32,
@@ -318,7 +318,7 @@ impl TryFrom<dialect::HOME_POSITION_DATA> for HomePosition {
 /// `GPS_GLOBAL_ORIGIN`: where the local frame's origin lies on the globe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GlobalOrigin {
-    /// Where.
+    /// Position.
     pub point: GeoPoint,
     /// Above mean sea level, mm.
     pub altitude_amsl_mm: i32,
@@ -335,7 +335,7 @@ impl TryFrom<dialect::GPS_GLOBAL_ORIGIN_DATA> for GlobalOrigin {
 /// `MAV_LANDED_STATE` of `EXTENDED_SYS_STATE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LandedState {
-    /// Not told.
+    /// Not reported.
     Unknown,
     /// On the ground.
     OnGround,
@@ -359,7 +359,7 @@ impl LandedState {
     }
 }
 
-/// `RC_CHANNELS`: what the aircraft pilot's transmitter says.
+/// `RC_CHANNELS`: the channels of the aircraft pilot's transmitter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RcChannels {
     /// The autopilot's time since it started, ms.
@@ -368,7 +368,7 @@ pub struct RcChannels {
 }
 
 impl RcChannels {
-    /// How many channels the message has.
+    /// Number of channels in the message.
     pub const COUNT: usize = 18;
     const UNUSED: u16 = u16::MAX;
 

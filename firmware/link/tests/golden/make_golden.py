@@ -19,14 +19,14 @@ OWN = dict(srcSystem=42, srcComponent=191)
 NAN = math.nan
 
 
-def frame(message, srcSystem, srcComponent, seq=7, dialect=mavlink2, key=None):
+def frame(message, srcSystem, srcComponent, seq=7, dialect=mavlink2, key=None, link_id=3, timestamp=123456789):
     mav = dialect.MAVLink(None, srcSystem=srcSystem, srcComponent=srcComponent)
     mav.seq = seq
     if key is not None:
         mav.signing.secret_key = key
         mav.signing.sign_outgoing = True
-        mav.signing.link_id = 3
-        mav.signing.timestamp = 123456789
+        mav.signing.link_id = link_id
+        mav.signing.timestamp = timestamp
     return message.pack(mav)
 
 
@@ -103,8 +103,8 @@ sent = [
     ("own_ack_accepted", m.MAVLink_command_ack_message(31010, 0, 0, 0, 255, 190)),
     ("own_ack_denied", m.MAVLink_command_ack_message(31010, 2, 0, 0, 255, 190)),
     ("own_ack_unsupported", m.MAVLink_command_ack_message(54321, 3, 0, 0, 255, 190)),
-    ("own_param_value_alt", m.MAVLink_param_value_message(b"GLN_ALT", 75.5, 9, 9, 2)),
-    ("own_param_value_reserve", m.MAVLink_param_value_message(b"GLN_RESERVE", 2.0, 9, 9, 4)),
+    ("own_param_value_alt", m.MAVLink_param_value_message(b"GLN_ALT", 75.5, 9, 10, 2)),
+    ("own_param_value_reserve", m.MAVLink_param_value_message(b"GLN_RESERVE", 2.0, 9, 10, 4)),
     ("own_named_value", m.MAVLink_named_value_float_message(2000, text("spare_bat", 10), 37.5)),
     ("own_text", m.MAVLink_statustext_message(6, text("engaged", 50), 0, 0)),
     ("own_text_chunk_0", m.MAVLink_statustext_message(4, b"0123456789" * 5, 1, 0)),
@@ -134,3 +134,7 @@ with open(os.path.join(FOLDER, "packets.txt"), "w") as out:
     key = hashlib.sha256(b"golden").digest()
     signed = m.MAVLink_heartbeat_message(2, 3, 0xD9, 4, 4, 3)
     out.write(f"signed_heartbeat {frame(signed, **VEHICLE, key=key).hex()}\n")
+    out.write(f"signed_heartbeat_later {frame(signed, **VEHICLE, key=key, timestamp=123456800).hex()}\n")
+    out.write(f"signed_unknown_link {frame(signed, **VEHICLE, key=key, link_id=9).hex()}\n")
+    setup = m.MAVLink_setup_signing_message(42, 191, list(range(32)), 1)
+    out.write(f"signed_setup_signing {frame(setup, **STATION, key=key).hex()}\n")

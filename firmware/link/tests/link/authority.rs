@@ -23,7 +23,7 @@ fn returns(bench: &mut Bench) -> usize {
 }
 
 #[test]
-fn a_request_is_repeated_only_after_a_newer_heartbeat_in_our_mode() {
+fn a_repetition_needs_a_newer_heartbeat_in_our_mode() {
     let mut bench = Bench::connected();
     let now = bench.now();
     bench.component.request(now, AutopilotCommand::ReturnToLaunch).unwrap();

@@ -1,4 +1,4 @@
-//! What is known of the autopilot, and how it is asked.
+//! State of the autopilot, and our requests to it.
 
 use crate::station::{Bench, STATION, VEHICLE, golden};
 use gleaner_link::*;
@@ -36,7 +36,8 @@ pub fn commands(bench: &mut Bench) -> Vec<(u16, f32, f32, u8)> {
     bench.sent_with_id(COMMAND).into_iter().map(read).collect()
 }
 
-/// Plays an autopilot that beats once a second and answers every asking with `result`; returns what was asked.
+/// Simulates an autopilot that sends a heartbeat a second and answers every command with `result`. Returns the
+/// commands.
 fn ask_and_answer(bench: &mut Bench, seconds: u64, result: u8) -> Vec<(u16, f32, f32, u8)> {
     let mut asked = Vec::new();
     for step in 0..seconds * 20 {
@@ -53,7 +54,7 @@ fn ask_and_answer(bench: &mut Bench, seconds: u64, result: u8) -> Vec<(u16, f32,
 }
 
 #[test]
-fn events_tell_of_connection_mode_arming_and_loss() {
+fn connection_mode_arming_and_loss_are_events() {
     let mut bench = Bench::fresh();
     for _ in 0..5 {
         bench.hear("heartbeat_copter_guided");
@@ -81,11 +82,11 @@ fn events_tell_of_connection_mode_arming_and_loss() {
 }
 
 #[test]
-fn strangers_do_not_speak_for_the_autopilot() {
+fn other_components_are_not_the_autopilot() {
     let mut bench = Bench::connected();
-    for stranger in [Address::new(42, 2), Address::new(43, 1), STATION, Address::new(42, 191)] {
-        bench.hear_packet(stranger, &heartbeat(5, false, 5));
-        bench.hear_packet(stranger, &position(1_000));
+    for other in [Address::new(42, 2), Address::new(43, 1), STATION, Address::new(42, 191)] {
+        bench.hear_packet(other, &heartbeat(5, false, 5));
+        bench.hear_packet(other, &position(1_000));
     }
     bench.hear("heartbeat_station");
     assert_eq!(bench.events(), []);
@@ -94,7 +95,7 @@ fn strangers_do_not_speak_for_the_autopilot() {
 }
 
 #[test]
-fn failsafes_begin_once_and_are_read_from_both_places() {
+fn failsafes_begin_once_and_come_from_both_messages() {
     let mut bench = Bench::connected();
     bench.hear_packet(VEHICLE, &heartbeat(4, true, 5));
     bench.hear_packet(VEHICLE, &heartbeat(4, true, 5));
@@ -134,7 +135,7 @@ fn ready_needs_estimator_origin_and_a_fresh_position() {
 }
 
 #[test]
-fn every_stream_is_asked_for_until_it_comes() {
+fn every_stream_is_requested_until_it_arrives() {
     let mut bench = Bench::connected();
     let asked = ask_and_answer(&mut bench, 6, 0);
     let streams: Vec<(f32, f32)> =
@@ -191,7 +192,7 @@ fn a_silent_or_unwilling_autopilot_is_not_flooded() {
 }
 
 #[test]
-fn a_reboot_is_noticed_and_everything_is_asked_for_again() {
+fn after_a_reboot_everything_is_requested_again() {
     let mut bench = Bench::connected();
     bench.hear("gps_global_origin");
     bench.hear_packet(VEHICLE, &position(500_000));

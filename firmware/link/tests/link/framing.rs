@@ -1,4 +1,4 @@
-//! Frames among noise.
+//! Frames among noise, and payloads that look like frames.
 
 use crate::seeded;
 use crate::station::{frames, golden};
@@ -30,7 +30,7 @@ fn decode_chunked(wire: &[u8], chunk: usize) -> (Vec<Frame>, FrameDecoder) {
     (found, decoder)
 }
 
-/// Noise that likes magic bytes, small lengths and the ids of known messages.
+/// Noise with many magic bytes, small lengths and ids of known messages.
 fn noise() -> impl Strategy<Value = Vec<u8>> {
     let byte = prop_oneof![4 => any::<u8>(), 2 => Just(0xFD), 1 => Just(0xFE), 3 => Just(0), 1 => 0u8..40];
     proptest::collection::vec(byte, 0..120)
@@ -40,26 +40,32 @@ proptest! {
     #![proptest_config(seeded())]
 
     #[test]
-    fn no_noise_and_no_split_costs_a_frame(
-        items in proptest::collection::vec((0..NAMES.len(), noise()), 1..12),
+    fn noise_costs_only_the_frames_close_behind_it(
+        before in proptest::collection::vec(0..NAMES.len(), 0..6),
+        noise in noise(),
+        behind in proptest::collection::vec(0..NAMES.len(), 1..6),
         chunk in 1usize..700,
     ) {
-        let mut wire = Vec::new();
-        let mut expected = Vec::new();
-        for (name, noise) in &items {
-            wire.extend_from_slice(noise);
-            let packet = golden(NAMES[*name]);
-            expected.extend(frames(&packet));
-            wire.extend_from_slice(&packet);
-        }
-        // A false magic byte may wait for as much as the longest frame before it is given up.
-        wire.extend_from_slice(&[0; 280]);
+        let packets = |names: &[usize]| names.iter().map(|&name| golden(NAMES[name])).collect::<Vec<_>>().concat();
+        // 30 heartbeats are longer than twice the longest frame.
+        let close = golden("heartbeat_copter_guided").repeat(30);
+        let (before, behind) = (packets(&before), packets(&behind));
+        let wire = [before.as_slice(), &noise, &close, &behind, &[0; 300]].concat();
         let (found, decoder) = decode_chunked(&wire, chunk);
-        let mut rest = found.iter();
-        for frame in &expected {
-            prop_assert!(rest.any(|other| other == frame), "lost {frame:?}");
-        }
+        let (before, behind) = (frames(&before), frames(&behind));
+        prop_assert_eq!(&found[..before.len()], before);
+        prop_assert_eq!(&found[found.len() - behind.len()..], behind);
         prop_assert_eq!(decoder.stats().frames as usize, found.len());
+    }
+
+    #[test]
+    fn clean_bytes_in_any_pieces_lose_nothing(
+        names in proptest::collection::vec(0..NAMES.len(), 1..12), chunk in 1usize..700,
+    ) {
+        let wire = names.iter().map(|&name| golden(NAMES[name])).collect::<Vec<_>>().concat();
+        let (found, decoder) = decode_chunked(&wire, chunk);
+        prop_assert_eq!(found, frames(&wire));
+        prop_assert_eq!(decoder.stats().garbage_bytes, 0);
     }
 
     #[test]
@@ -67,7 +73,7 @@ proptest! {
         name in 0..NAMES.len(), next in 0..NAMES.len(), at in 0usize..300, flip in 1u8..=255, cut in proptest::option::of(1usize..300),
     ) {
         let mut damaged = golden(NAMES[name]);
-        // Behind the checksum of a signed frame lies a signature that nobody verifies.
+        // The decoder does not verify the signature behind the checksum.
         let checked = damaged.len() - if NAMES[name].starts_with("signed") { 13 } else { 0 };
         match cut {
             None => damaged[at % checked] ^= flip,
@@ -111,4 +117,61 @@ fn each_kind_of_damage_has_its_counter() {
     assert_eq!(damage(0, 0x55).garbage_bytes, good.len() as u32);
     let (_, decoder) = decode_chunked(&golden("signed_heartbeat"), 1_000);
     assert_eq!((decoder.stats().signed, decoder.stats().garbage_bytes), (1, 0));
+}
+
+/// A MAVLink 2 frame with an id outside the dialect. Its checksum cannot be known.
+fn unknown_frame(payload: &[u8]) -> Vec<u8> {
+    let header = [0xFD, payload.len() as u8, 0, 0, 7, 255, 190, 0x39, 0x30, 0xD0];
+    [&header, payload, &[0x12, 0x34]].concat()
+}
+
+#[test]
+fn a_frame_inside_an_unknown_frame_is_data() {
+    let engage = golden("command_user_1");
+    let heartbeat = golden("heartbeat_copter_guided");
+    let carrier = unknown_frame(&engage.repeat(3));
+    for chunk in [1, 7, 1_000] {
+        let wire = [heartbeat.clone(), carrier.repeat(5), heartbeat.clone()].concat();
+        let (found, decoder) = decode_chunked(&wire, chunk);
+        assert_eq!(found, frames(&heartbeat.repeat(2)), "in chunks of {chunk}");
+        assert_eq!(decoder.stats().unknown_message, 5);
+    }
+}
+
+#[test]
+fn a_datagram_of_an_unknown_frame_holds_no_frame() {
+    let mut bench = crate::station::Bench::connected();
+    let carrier = unknown_frame(&golden("command_user_1"));
+    // Also when the datagram is cut, and when the next one begins with noise.
+    for length in [carrier.len(), carrier.len() - 1, carrier.len() - 20] {
+        let now = bench.now();
+        bench.component.receive_datagram(now, &carrier[..length]);
+        bench.component.receive_datagram(now, &[0; 300]);
+        bench.run(100);
+    }
+    assert_eq!(bench.events(), []);
+    bench.component.receive_datagram(bench.now(), &golden("command_user_1"));
+    assert_eq!(bench.events().len(), 1);
+}
+
+#[test]
+fn a_frame_inside_a_damaged_frame_is_data() {
+    let engage = golden("command_user_1");
+    let mut carrier = crate::conversation::tunnel_of(&engage);
+    carrier[12] ^= 1;
+    let heartbeat = golden("heartbeat_copter_guided");
+    let wire = [heartbeat.clone(), carrier, heartbeat.clone()].concat();
+    let (found, decoder) = decode_chunked(&wire, 50);
+    assert_eq!(found, frames(&heartbeat.repeat(2)));
+    assert_eq!(decoder.stats().bad_crc, 1);
+}
+
+#[test]
+fn a_lost_byte_in_an_unknown_frame_costs_one_frame_more() {
+    let heartbeat = golden("heartbeat_copter_guided");
+    let mut carrier = unknown_frame(&golden("command_user_1"));
+    carrier.remove(20);
+    let wire = [heartbeat.clone(), carrier, heartbeat.repeat(4)].concat();
+    let (found, _) = decode_chunked(&wire, 1_000);
+    assert_eq!(found.len(), 1 + 3);
 }

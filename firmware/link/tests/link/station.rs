@@ -1,4 +1,4 @@
-//! The other ends of the wire: golden packets by name, and a component with its clock.
+//! The other end of the wire: golden packets by name, and a component with its clock.
 
 use gleaner_link::{
     Address, Component, Event, Frame, FrameDecoder, Message, Packet, Parameters, Settings, Status,
@@ -6,7 +6,7 @@ use gleaner_link::{
 };
 use gleaner_units::Instant;
 
-/// The frame of this name, as another implementation made it.
+/// The frame of this name, made by pymavlink.
 pub fn golden(name: &str) -> Vec<u8> {
     let packets = include_str!("../golden/packets.txt");
     let hex = packets.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
@@ -14,7 +14,7 @@ pub fn golden(name: &str) -> Vec<u8> {
     (0..hex.len() / 2).map(|at| u8::from_str_radix(&hex[2 * at..2 * at + 2], 16).unwrap()).collect()
 }
 
-/// All frames in some bytes; the bytes must be nothing else.
+/// All frames in `bytes`, which must contain nothing else.
 pub fn frames(bytes: &[u8]) -> Vec<Frame> {
     let mut decoder = FrameDecoder::new();
     let mut frames = Vec::new();
@@ -32,7 +32,7 @@ pub fn frames(bytes: &[u8]) -> Vec<Frame> {
 pub const VEHICLE: Address = Address::new(42, 1);
 pub const STATION: Address = Address::new(255, 190);
 
-/// A component, its clock, and what it said.
+/// A component and its clock.
 pub struct Bench {
     pub component: Component,
     pub now_ms: u64,
@@ -53,8 +53,13 @@ impl Bench {
         bench
     }
 
+    /// A component before the first byte.
     pub fn fresh() -> Bench {
-        let component = Component::new(Settings::default(), Parameters::default());
+        Bench::with(Settings::default())
+    }
+
+    pub fn with(settings: Settings) -> Bench {
+        let component = Component::new(settings, Parameters::default());
         let status = Status { state: SystemState::Active, may_engage: true, may_return: true };
         Bench { component, now_ms: 1_000, status }
     }
@@ -102,7 +107,7 @@ impl Bench {
         frames(&self.sent_bytes())
     }
 
-    /// What was sent with this message id.
+    /// Sent frames with this message id.
     pub fn sent_with_id(&mut self, id: u32) -> Vec<Frame> {
         self.sent().into_iter().filter(|frame| frame.message_id == id).collect()
     }

@@ -7,7 +7,7 @@ use gleaner_link::SettingsError;
 /// Our identity on the link, and our limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// MAVLink system id when no vehicle's can be adopted; `None` is 1.
+    /// MAVLink system id of the vehicle to serve; `None` adopts that of the only autopilot heard.
     pub system_id: Option<u8>,
     /// MAVLink component id, 191 unless something else on the vehicle has it.
     pub component_id: u8,
@@ -27,7 +27,7 @@ impl Settings {
     /// # Errors
     /// The ids are impossible.
     pub fn checked(self) -> Result<gleaner_link::Settings, SettingsError> {
-        gleaner_link::Settings::new(self.system_id.unwrap_or(1), self.component_id)
+        gleaner_link::Settings::new(self.system_id, self.component_id)
     }
 }
 

@@ -77,7 +77,7 @@ impl Bench {
         let data = dialect::COMMAND_LONG_DATA {
             command,
             param1,
-            target_system: 0,
+            target_system: self.onboard.link().address().system,
             target_component: 191,
             ..dialect::COMMAND_LONG_DATA::DEFAULT
         };
@@ -322,7 +322,7 @@ fn reports_count_from_the_radio_and_from_the_tunnel() {
         |device, snr, remaining| Report { device, snr: Db(snr), remaining: Some(remaining), age_ms: 100 };
     bench.onboard.receive_radio(bench.now, &encode(&report(7, 11.0, 3000.0)));
     bench.onboard.receive_radio(bench.now, &encode(&report(300, 11.0, 3000.0)));
-    let mut modem = Component::new(gleaner_link::Settings::new(3, 192).unwrap(), Parameters::default());
+    let mut modem = Component::new(gleaner_link::Settings::new(Some(3), 192).unwrap(), Parameters::default());
     modem.tunnel(TUNNEL_RADIO_REPORT, &encode_body(&report(9, 6.0, 1000.0)));
     modem.tunnel(TUNNEL_RADIO_REPORT, &[0xFF; 9]);
     let mut bytes = [0; 512];
@@ -374,7 +374,7 @@ fn a_knob_sets_the_preference_for_everyone_to_see() {
     bench.run(8);
     let set = dialect::PARAM_SET_DATA {
         param_value: 6.0,
-        target_system: 0,
+        target_system: bench.onboard.link().address().system,
         target_component: 191,
         param_id: "GLN_W_RC".into(),
         ..dialect::PARAM_SET_DATA::DEFAULT

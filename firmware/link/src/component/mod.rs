@@ -3,123 +3,29 @@
 mod answering;
 mod sending;
 
-use crate::autopilot::is_autopilot;
-use crate::commands::Answers;
-use crate::event::Events;
-use crate::identity::{Identity, Settled};
-use crate::parameter_service::ParameterService;
-use crate::requests::Requests;
-use crate::steering::Steering;
-use crate::text::Texts;
-use crate::{
-    Address, Autopilot, AutopilotCommand, DecodeStats, Event, FrameDecoder, Message, MessageFault, Outgoing,
-    OutgoingStats, ParameterError, ParameterId, Parameters, PositionTarget, Severity, SystemState,
-    TargetError,
-};
+use crate::address::Address;
+use crate::autopilot_command::AutopilotCommand;
+use crate::event::{Event, Events};
+use crate::message::SystemState;
+use crate::message::{Message, MessageFault, Severity};
+use crate::operators::Operators;
+use crate::parameters::{ParameterError, ParameterId, Parameters};
+use crate::service::autopilot::{Autopilot, is_autopilot};
+use crate::service::commands::Answers;
+use crate::service::identity::{Identity, Settled};
+use crate::service::parameters::ParameterService;
+use crate::service::requests::Requests;
+use crate::service::steering::Steering;
+use crate::service::texts::Texts;
+use crate::setpoint::PositionTarget;
+use crate::settings::{EngageBlock, LinkStats, NotSent, Settings, Status};
+use crate::wire::decoder::FrameDecoder;
+use crate::wire::frame::Frame;
+use crate::wire::outgoing::Outgoing;
 use core::fmt;
 use gleaner_units::{Duration, Instant, Ned};
+use heapless::String;
 use mavlink::dialects::ardupilotmega::MavCmd;
-
-/// Who we are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
-    system: u8,
-    component: u8,
-}
-
-/// Why settings are refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SettingsError {
-    /// System ids are 1..254: 0 is everyone, 255 is the ground station.
-    System,
-    /// Component ids are 2..255: 0 is everyone, 1 is the autopilot.
-    Component,
-}
-
-impl fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SettingsError::System => write!(f, "the system id must be 1..254"),
-            SettingsError::Component => write!(f, "the component id must be 2..255"),
-        }
-    }
-}
-
-impl core::error::Error for SettingsError {}
-
-impl Default for Settings {
-    /// System 1, component 191 (`MAV_COMP_ID_ONBOARD_COMPUTER`).
-    fn default() -> Settings {
-        Settings { system: 1, component: 191 }
-    }
-}
-
-impl Settings {
-    /// `system` is used until a vehicle's id is adopted, and when several vehicles are heard.
-    ///
-    /// # Errors
-    /// See [`SettingsError`].
-    pub const fn new(system: u8, component: u8) -> Result<Settings, SettingsError> {
-        if system == 0 || system == 255 {
-            return Err(SettingsError::System);
-        }
-        if component < 2 {
-            return Err(SettingsError::Component);
-        }
-        Ok(Settings { system, component })
-    }
-}
-
-/// What the owner of the component is, told with every poll.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Status {
-    /// Goes into the heartbeat.
-    pub state: SystemState,
-    /// While false, the command to engage is temporarily rejected.
-    pub may_engage: bool,
-    /// While false, the command to return is denied.
-    pub may_return: bool,
-}
-
-/// Why something was not sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotSent {
-    /// No autopilot is connected.
-    NoAutopilot,
-    /// A number is NaN or infinite.
-    NotFinite,
-}
-
-impl From<TargetError> for NotSent {
-    fn from(error: TargetError) -> NotSent {
-        match error {
-            TargetError::NotFinite => NotSent::NotFinite,
-        }
-    }
-}
-
-/// All counters of a component. They stop at their maximum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LinkStats {
-    /// Framing.
-    pub decode: DecodeStats,
-    /// Queueing.
-    pub outgoing: OutgoingStats,
-    /// Messages refused because a field was not allowed.
-    pub malformed: u32,
-    /// Messages refused because of NaN, infinity or an impossible latitude or longitude.
-    pub bad_coordinates: u32,
-    /// Messages for others.
-    pub for_others: u32,
-    /// Messages that we have no use for.
-    pub not_needed: u32,
-    /// Commands left unanswered for want of room; their senders try again.
-    pub commands_postponed: u32,
-    /// Events dropped because the owner did not take them.
-    pub events_dropped: u32,
-    /// Status texts dropped for want of room.
-    pub texts_dropped: u32,
-}
 
 /// The last `GLN_ENABLE` that was set from outside.
 #[derive(Clone, Copy, Debug)]
@@ -129,15 +35,30 @@ struct EnableSet {
     at: Instant,
 }
 
+/// Heartbeats with our own ids that we did not send.
+#[derive(Clone, Copy, Debug, Default)]
+struct Duplicate {
+    heartbeats: u8,
+    last_at: Option<Instant>,
+}
+
+/// Where a ground station finds the component's metadata (MAVLink guide, "Component Metadata Protocol").
+#[derive(Clone, Debug)]
+struct Metadata {
+    uri: String<100>,
+    crc: u32,
+}
+
 /// One MAVLink component on one link.
 ///
-/// Call [`Component::receive`] with what arrived, [`Component::poll`] from the decision loop, take the events,
-/// and [`Component::transmit`] what is to leave.
+/// Call [`Component::receive`] with the bytes that arrived, [`Component::poll`] from the decision loop, take the
+/// events, and send what [`Component::transmit`] returns.
 #[derive(Debug)]
 pub struct Component {
     decoder: FrameDecoder,
     outgoing: Outgoing,
     identity: Identity,
+    operators: Operators,
     autopilot: Autopilot,
     parameters: Parameters,
     parameter_service: ParameterService,
@@ -149,23 +70,31 @@ pub struct Component {
     steering: Steering,
     revocations: u32,
     enable_set: Option<EnableSet>,
+    duplicate: Duplicate,
+    block: Option<EngageBlock>,
+    metadata: Option<Metadata>,
     started_at: Option<Instant>,
     heartbeat_at: Option<Instant>,
     stats: LinkStats,
 }
 
 impl Component {
-    /// After this long without any autopilot the configured system id is used, so that routers let us in.
+    /// After this long without any autopilot the first system id is used, so that routers learn of us.
     const PATIENCE: Duration = Duration::from_secs(5);
     const HEARTBEAT_PERIOD: Duration = Duration::from_secs(1);
+    /// A component with our ids that was silent for this long is gone.
+    const DUPLICATE_GONE: Duration = Duration::from_secs(10);
+    /// One may be a late echo of ours; two are another component.
+    const DUPLICATE_HEARTBEATS: u8 = 2;
 
-    /// A component that has heard and said nothing.
+    /// A component before the first byte.
     #[must_use]
     pub fn new(settings: Settings, parameters: Parameters) -> Component {
         Component {
             decoder: FrameDecoder::new(),
             outgoing: Outgoing::new(),
-            identity: Identity::new(Address::new(settings.system, settings.component)),
+            identity: Identity::new(settings.system, settings.component),
+            operators: settings.operators,
             autopilot: Autopilot::default(),
             parameters,
             parameter_service: ParameterService::default(),
@@ -177,29 +106,44 @@ impl Component {
             steering: Steering::default(),
             revocations: 0,
             enable_set: None,
+            duplicate: Duplicate::default(),
+            block: None,
+            metadata: None,
             started_at: None,
             heartbeat_at: None,
             stats: LinkStats::default(),
         }
     }
 
-    /// Takes in bytes of the link.
+    /// Takes in bytes of a stream: a serial line or a TCP connection.
     pub fn receive(&mut self, now: Instant, mut bytes: &[u8]) {
         loop {
             let taken = self.decoder.push(bytes);
             bytes = bytes.get(taken..).unwrap_or(&[]);
             while let Some(frame) = self.decoder.next_frame() {
-                match Message::decode(&frame) {
-                    Ok(Some(message)) => self.take(now, frame.sender, &message),
-                    Ok(None) => count(&mut self.stats.not_needed),
-                    Err(MessageFault::Malformed) => count(&mut self.stats.malformed),
-                    Err(MessageFault::NotFinite | MessageFault::NotOnTheGlobe) => {
-                        count(&mut self.stats.bad_coordinates);
-                    }
-                }
+                self.receive_frame(now, &frame);
             }
             if bytes.is_empty() {
                 return;
+            }
+        }
+    }
+
+    /// Takes in one datagram. Frames do not continue in the next one.
+    pub fn receive_datagram(&mut self, now: Instant, bytes: &[u8]) {
+        self.decoder.begin_datagram();
+        self.receive(now, bytes);
+    }
+
+    /// Takes in one frame of a decoder of the program's own: one decoder per port, so that the bytes of several ports
+    /// do not mix, and signatures can be verified first ([`crate::Signing`]).
+    pub fn receive_frame(&mut self, now: Instant, frame: &Frame) {
+        match Message::decode(frame) {
+            Ok(Some(message)) => self.take(now, frame, &message),
+            Ok(None) => count(&mut self.stats.not_needed),
+            Err(MessageFault::Malformed) => count(&mut self.stats.malformed),
+            Err(MessageFault::NotFinite | MessageFault::NotOnTheGlobe) => {
+                count(&mut self.stats.bad_coordinates);
             }
         }
     }
@@ -210,8 +154,9 @@ impl Component {
         self.owner = *status;
         let started_at = *self.started_at.get_or_insert(now);
         if let Some(settled) = self.identity.poll(now) {
-            self.tell_identity(settled);
+            self.report_identity(settled);
         }
+        self.watch_block(now);
         let wants_rc = self.parameters.data_weight_channel().is_some();
         self.autopilot.poll(now, wants_rc, &mut self.outgoing, &mut self.events);
         match self.autopilot.address().filter(|_| self.autopilot.is_connected()) {
@@ -221,7 +166,7 @@ impl Component {
             }
             None => self.requests.abandon(&mut self.events),
         }
-        let speaks = self.identity.settled().is_some() || now.since(started_at) >= Component::PATIENCE;
+        let speaks = self.identity.is_settled() || now.since(started_at) >= Component::PATIENCE;
         if speaks {
             self.poll_heartbeat(now, status.state);
             self.parameter_service.poll(&self.parameters, &mut self.outgoing);
@@ -245,7 +190,7 @@ impl Component {
         self.identity.own()
     }
 
-    /// What is known of the autopilot.
+    /// State of the autopilot.
     #[must_use]
     pub const fn autopilot(&self) -> &Autopilot {
         &self.autopilot
@@ -257,13 +202,13 @@ impl Component {
         &self.parameters
     }
 
-    /// Sets a parameter from within and tells everyone. Makes no event.
+    /// Sets a parameter from within and broadcasts its value. Makes no event.
     ///
     /// # Errors
     /// As [`Parameters::set_id`].
     pub fn set_parameter(&mut self, id: ParameterId, value: f32) -> Result<(), ParameterError> {
         self.parameters.set_id(id, value)?;
-        self.parameter_service.tell(id);
+        self.parameter_service.send(id);
         Ok(())
     }
 
@@ -297,7 +242,7 @@ impl Component {
         self.revocations
     }
 
-    /// The target of someone else that the autopilot followed since we began to steer.
+    /// A target that is not ours and that the autopilot followed since we began to steer.
     #[must_use]
     pub const fn foreign_target(&self) -> Option<Ned> {
         self.steering.foreign()
@@ -308,7 +253,7 @@ impl Component {
         self.autopilot.take_other_mode()
     }
 
-    /// Asks something of the autopilot, three times in three seconds, until it answers; ends with
+    /// Sends a command to the autopilot, up to three times until it is acknowledged. Ends with
     /// [`Event::RequestEnded`].
     ///
     /// # Errors
@@ -341,28 +286,69 @@ impl Component {
         }
     }
 
-    fn tell_identity(&mut self, settled: Settled) {
+    /// Why the link refuses to engage now, if it does. As of the last poll.
+    #[must_use]
+    pub const fn engage_block(&self) -> Option<EngageBlock> {
+        self.block
+    }
+
+    /// Names the general metadata file for ground stations: its URI of at most 100 bytes and its checksum
+    /// ([`crate::metadata::checksum`]). False if the URI is too long. Without it, requests for `COMPONENT_METADATA` are
+    /// denied.
+    pub fn set_metadata(&mut self, uri: &str, crc: u32) -> bool {
+        self.metadata = String::try_from(uri).ok().map(|uri| Metadata { uri, crc });
+        self.metadata.is_some()
+    }
+
+    fn report_identity(&mut self, settled: Settled) {
         let own = self.identity.own();
         match settled {
-            Settled::Adopted(system) => {
+            Settled::Configured(_) | Settled::Adopted(_) => {
                 self.say(
                     Severity::Info,
-                    format_args!("gleaner: system {system}, component {}", own.component),
+                    format_args!("gleaner: system {}, component {}", own.system, own.component),
                 );
             }
-            Settled::Several => {
-                self.say(
-                    Severity::Warning,
-                    format_args!("gleaner: several autopilots heard, serving system {}", own.system),
-                );
+            // The reason not to engage is reported with all others.
+            Settled::Several => {}
+        }
+    }
+
+    /// Reports a new reason not to engage.
+    fn watch_block(&mut self, now: Instant) {
+        let is_duplicate = self.duplicate.heartbeats >= Component::DUPLICATE_HEARTBEATS
+            && self.duplicate.last_at.is_some_and(|at| now.since(at) < Component::DUPLICATE_GONE);
+        let block = if is_duplicate {
+            Some(EngageBlock::DuplicateId)
+        } else if let Some(system) = self.identity.rival(now) {
+            Some(EngageBlock::SeveralAutopilots(system))
+        } else {
+            self.autopilot.unsupported_vehicle().map(EngageBlock::NotMultirotor)
+        };
+        if block == self.block {
+            return;
+        }
+        self.block = block;
+        let own = self.identity.own();
+        match block {
+            None => {}
+            Some(EngageBlock::DuplicateId) => {
+                self.say(Severity::Critical, format_args!("gleaner: another component has our id {own}"));
+            }
+            Some(EngageBlock::SeveralAutopilots(_)) => {
+                self.say(Severity::Critical, format_args!("gleaner: several autopilots: set system_id"));
+            }
+            Some(EngageBlock::NotMultirotor(vehicle)) => {
+                self.say(Severity::Critical, format_args!("gleaner: MAV_TYPE {vehicle} is no multirotor"));
             }
         }
     }
 
-    /// One message with its sender.
-    fn take(&mut self, now: Instant, sender: Address, message: &Message) {
-        let own = self.identity.own();
+    /// One message of `frame`.
+    fn take(&mut self, now: Instant, frame: &Frame, message: &Message) {
+        let (own, sender) = (self.identity.own(), frame.sender);
         if sender == own {
+            self.watch_own_id(now, frame, message);
             return;
         }
         if let Message::Heartbeat(heartbeat) = message
@@ -374,10 +360,24 @@ impl Component {
             count(&mut self.stats.for_others);
             return;
         }
-        if self.identity.settled().is_some() && sender.system == own.system {
+        if self.identity.serves(sender.system) {
             self.take_from_vehicle(now, sender, message);
         }
         self.answer(now, sender, message);
+    }
+
+    /// A message with our own ids: an echo of ours, which a router may return, or another component with the same ids.
+    /// An echoed heartbeat has the sequence number of one that we sent.
+    fn watch_own_id(&mut self, now: Instant, frame: &Frame, message: &Message) {
+        if !matches!(message, Message::Heartbeat(_)) || self.outgoing.sent_heartbeat(frame.sequence) {
+            return;
+        }
+        count(&mut self.stats.duplicate_id);
+        if self.duplicate.last_at.is_none_or(|at| now.since(at) >= Component::DUPLICATE_GONE) {
+            self.duplicate.heartbeats = 0;
+        }
+        self.duplicate.heartbeats = self.duplicate.heartbeats.saturating_add(1);
+        self.duplicate.last_at = Some(now);
     }
 
     fn take_from_vehicle(&mut self, now: Instant, sender: Address, message: &Message) {

@@ -1,25 +1,19 @@
-//! Packets waiting for the wire, and their framing.
+//! The queue to the wire of one link.
 
-use crate::{Address, AutopilotCommand};
+use super::packet::{FrameBytes, LONGEST_SENT, Packet};
+use crate::address::Address;
+use crate::autopilot_command::AutopilotCommand;
+use crate::fields::Fields;
 use heapless::{Deque, Vec};
+use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
-use mavlink::{MavlinkVersion, MessageData};
 
-/// Longest payload that this component sends: `COMPONENT_INFORMATION_BASIC`.
-const LONGEST_PAYLOAD: usize = 160;
-const HEADER: usize = 10;
-const CHECKSUM: usize = 2;
-const MAGIC: u8 = 0xFD;
-
-/// One frame, ready for the wire.
-pub type FrameBytes = Vec<u8, { HEADER + LONGEST_PAYLOAD + CHECKSUM }>;
-
-/// What is sent first and what may be lost.
+/// Order of sending, and what happens when there is no room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Priority {
-    /// One place, the newest wins. First on the wire.
+    /// One place: a newer one replaces it. First on the wire.
     Heartbeat,
-    /// One place, the newest wins: an old setpoint is worse than none.
+    /// One place: a newer one replaces it, since an old setpoint is worse than none.
     Setpoint,
     /// Acknowledgements, requests, parameter values: in order; refused when there is no room.
     Urgent,
@@ -27,61 +21,21 @@ pub enum Priority {
     Bulk,
 }
 
-/// A message not yet framed: number and sender are added when it leaves, so a dropped one leaves no gap.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Packet {
-    message_id: u32,
-    extra_crc: u8,
-    payload: Vec<u8, LONGEST_PAYLOAD>,
-}
-
-impl Packet {
-    /// The packet of a dialect message; `None` if it is longer than any message of ours.
-    #[must_use]
-    pub fn new<D: MessageData>(data: &D) -> Option<Packet> {
-        let mut bytes = [0; crate::MAX_PAYLOAD_BYTES];
-        let length = data.ser(MavlinkVersion::V2, &mut bytes);
-        Packet::from_payload(D::ID, D::EXTRA_CRC, bytes.get(..length)?)
-    }
-
-    /// The packet of a payload laid out by hand; `None` if it is too long.
-    #[must_use]
-    pub fn from_payload(message_id: u32, extra_crc: u8, payload: &[u8]) -> Option<Packet> {
-        Some(Packet { message_id, extra_crc, payload: Vec::from_slice(payload).ok()? })
-    }
-
-    /// The MAVLink 2 frame: trailing zeros cut off except for the first byte, no signature.
-    #[must_use]
-    pub fn frame(&self, sender: Address, sequence: u8) -> FrameBytes {
-        let used = self.payload.iter().rposition(|&byte| byte != 0).map_or(1, |last| last + 1);
-        let [id0, id1, id2, _] = self.message_id.to_le_bytes();
-        let header = [MAGIC, used as u8, 0, 0, sequence, sender.system, sender.component, id0, id1, id2];
-        let mut frame = FrameBytes::new();
-        let body = self.payload.iter().copied().chain([0]).take(used);
-        // `FrameBytes` is as long as the longest frame, so nothing is cut off here.
-        for byte in header.into_iter().chain(body) {
-            let _ = frame.push(byte);
-        }
-        let checksum = mavlink::calculate_crc(frame.get(1..).unwrap_or(&[]), self.extra_crc);
-        for byte in checksum.to_le_bytes() {
-            let _ = frame.push(byte);
-        }
-        frame
-    }
-}
-
-/// What went out and what did not. Counters stop at their maximum.
+/// Counters of sent and dropped packets. They stop at their maximum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OutgoingStats {
-    /// Frames handed to the wire, the last one perhaps in part.
+    /// Frames handed to the wire; of the last one perhaps a part.
     pub frames: u32,
-    /// Telemetry dropped for want of room.
+    /// Telemetry dropped because the queue was full.
     pub bulk_dropped: u32,
-    /// Urgent packets refused for want of room.
+    /// Urgent packets refused because the queue was full.
     pub urgent_refused: u32,
     /// Setpoints replaced by a newer one before they left.
     pub setpoints_replaced: u32,
 }
+
+/// Heartbeats whose sequence numbers are remembered.
+const REMEMBERED: usize = 8;
 
 /// The queue to the wire of one link.
 #[derive(Debug, Default)]
@@ -93,6 +47,7 @@ pub struct Outgoing {
     leaving: FrameBytes,
     left: usize,
     sequence: u8,
+    heartbeats: Deque<u8, REMEMBERED>,
     stats: OutgoingStats,
 }
 
@@ -111,6 +66,7 @@ impl Outgoing {
             leaving: Vec::new(),
             left: 0,
             sequence: 0,
+            heartbeats: Deque::new(),
             stats: OutgoingStats { frames: 0, bulk_dropped: 0, urgent_refused: 0, setpoints_replaced: 0 },
         }
     }
@@ -141,13 +97,13 @@ impl Outgoing {
         true
     }
 
-    /// How many more urgent packets fit.
+    /// Number of urgent packets that still fit.
     #[must_use]
     pub fn urgent_room(&self) -> usize {
         Outgoing::URGENT - self.urgent.len()
     }
 
-    /// Whether a bulk packet fits without costing an older one.
+    /// Whether a bulk packet fits without displacing an older one.
     #[must_use]
     pub fn has_bulk_room(&self) -> bool {
         !self.bulk.is_full()
@@ -164,15 +120,21 @@ impl Outgoing {
         }
     }
 
-    /// Fills `out` with bytes for the wire and returns how many; 0 when there is nothing to send. Holds whole
-    /// frames when `out` takes the longest one ([`FrameBytes`]): what a datagram wants. A shorter `out` gets
-    /// them in pieces.
+    /// Whether one of the last heartbeats that left had this sequence number.
+    #[must_use]
+    pub fn sent_heartbeat(&self, sequence: u8) -> bool {
+        self.heartbeats.iter().any(|&sent| sent == sequence)
+    }
+
+    /// Fills `out` with bytes for the wire and returns how many; 0 when there is nothing to send. An `out` with room
+    /// for the longest frame ([`FrameBytes`]) gets whole frames, as a datagram needs them; a shorter one gets them
+    /// in pieces.
     pub fn transmit(&mut self, sender: Address, out: &mut [u8]) -> usize {
         let room = out.len();
         let mut written = 0;
         for slot in out {
             let between_frames = self.left >= self.leaving.len();
-            if between_frames && written > 0 && room - written < HEADER + LONGEST_PAYLOAD + CHECKSUM {
+            if between_frames && written > 0 && room - written < LONGEST_SENT {
                 break;
             }
             let Some(byte) = self.next_byte(sender) else { break };
@@ -190,7 +152,14 @@ impl Outgoing {
 
     fn next_byte(&mut self, sender: Address) -> Option<u8> {
         if self.left >= self.leaving.len() {
+            let is_heartbeat = self.heartbeat.is_some();
             let packet = self.next_packet()?;
+            if is_heartbeat {
+                if self.heartbeats.is_full() {
+                    let _ = self.heartbeats.pop_front();
+                }
+                let _ = self.heartbeats.push_back(self.sequence);
+            }
             self.leaving = packet.frame(sender, self.sequence);
             self.left = 0;
             self.sequence = self.sequence.wrapping_add(1);
@@ -212,18 +181,20 @@ impl Outgoing {
 
 /// Whether a packet is a command of [`crate::AutopilotCommand`].
 fn moves_the_aircraft(packet: &Packet) -> bool {
-    packet.message_id == COMMAND_LONG_DATA::ID && {
-        let command = crate::fields::Fields(&packet.payload).u16(28);
+    packet.message_id() == COMMAND_LONG_DATA::ID && {
+        let command = Fields(packet.payload()).u16(28);
         AutopilotCommand::KINDS.iter().any(|&kind| kind as u32 == u32::from(command))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::frame::{CHECKSUM, HEADER_V2 as HEADER, MAGIC_V2 as MAGIC};
+    use super::super::packet::LONGEST_PAYLOAD;
     use super::*;
 
     #[test]
-    fn a_buffer_for_the_longest_frame_never_gets_half_of_one() {
+    fn long_buffers_get_whole_frames() {
         let own = Address::new(1, 191);
         let payload = [1; LONGEST_PAYLOAD];
         let queue = || {

@@ -4,7 +4,7 @@
 //! that it follows (`POSITION_TARGET_LOCAL_NED`, or `POSITION_TARGET_GLOBAL_INT` if another station asked for it). A
 //! new target that is not one of ours is a take-over.
 
-use crate::FollowedTarget;
+use crate::message::FollowedTarget;
 use gleaner_units::{Duration, GeoPoint, Instant, Metres, Ned};
 use heapless::Deque;
 

@@ -1,33 +1,26 @@
-//! What is known of the one autopilot.
+//! State of the autopilot that we serve.
 
-use crate::event::Events;
-use crate::streams::{Streams, Wants};
-use crate::{
-    Address, BatteryStatus, ChargeState, CommandResult, Event, Firmware, FlightMode, GlobalOrigin,
-    GlobalPosition, Heartbeat, HomePosition, LandedState, LocalPosition, Message, Outgoing, RcChannels,
-    SystemState,
+use crate::address::Address;
+use crate::event::{Event, Events, Failsafe};
+use crate::message::{
+    BatteryStatus, ChargeState, CommandResult, GlobalOrigin, GlobalPosition, Heartbeat, HomePosition,
+    LandedState, LocalPosition, Message, RcChannels, SystemState,
 };
+use crate::mode::{Firmware, FlightMode, is_multirotor};
+use crate::service::streams::{Streams, Wants};
+use crate::wire::outgoing::Outgoing;
 use gleaner_units::{Duration, Instant};
 
-/// Which failsafe the autopilot reports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Failsafe {
-    /// The heartbeat's system status is critical or worse.
-    System,
-    /// A battery is low or worse. Latched by ArduPilot: it stays until the battery is changed.
-    Battery,
-}
-
-/// The last report of some kind, and when it came.
+/// The last report of a kind, and when it arrived.
 type Latest<T> = Option<(T, Instant)>;
 
-/// The autopilot that we serve, as far as its messages tell.
+/// The autopilot that we serve, as its messages describe it.
 ///
 /// ```text
 ///            heartbeat                 5 s without one
 /// unknown ------------> connected <------------------> lost
 ///                       |      ^        heartbeat
-///                       +------+  its clock went back: all is forgotten, streams are asked for again
+///                       +------+  its clock went back: everything is forgotten, streams are requested again
 /// ```
 #[derive(Debug, Default)]
 pub struct Autopilot {
@@ -38,7 +31,7 @@ pub struct Autopilot {
     known: Known,
 }
 
-/// Everything that a reboot makes worthless.
+/// State that a reboot makes invalid.
 #[derive(Debug, Default)]
 struct Known {
     position: Latest<LocalPosition>,
@@ -57,7 +50,7 @@ struct Known {
     streams: Streams,
 }
 
-/// Estimator flags that mean "knows where it is": attitude, velocities, absolute and predicted positions.
+/// Estimator flags of a valid position: attitude, velocities, absolute and predicted positions.
 /// `EKF_STATUS_REPORT` and `ESTIMATOR_STATUS` have the same bits. PX4 sets the relative ones only without GNSS.
 const ARDUPILOT_READY: u16 = 0x033F;
 const PX4_READY: u16 = 0x0037;
@@ -65,16 +58,16 @@ const PX4_READY: u16 = 0x0037;
 impl Autopilot {
     /// Lost after five missed heartbeats.
     const LOST: Duration = Duration::from_secs(5);
-    /// A clock that is behind by more than this started again; less is messages out of order.
+    /// A clock that is behind by more than this restarted; less is messages out of order.
     const CLOCK_SLACK_MS: u32 = 1_000;
 
-    /// Its address, once a heartbeat of it came.
+    /// Its address, once a heartbeat has arrived.
     #[must_use]
     pub const fn address(&self) -> Option<Address> {
         self.address
     }
 
-    /// Whether a heartbeat came within the last five seconds (as of the last poll).
+    /// Whether a heartbeat arrived within the last five seconds (as of the last poll).
     #[must_use]
     pub const fn is_connected(&self) -> bool {
         self.connected
@@ -86,11 +79,22 @@ impl Autopilot {
         self.heartbeat.map(|(heartbeat, _)| Firmware::from_wire(heartbeat.autopilot))
     }
 
+    /// Its `MAV_TYPE`, if that is no multirotor: such a vehicle is not served.
+    #[must_use]
+    pub fn unsupported_vehicle(&self) -> Option<u8> {
+        let (heartbeat, _) = self.heartbeat.filter(|_| self.connected)?;
+        Some(heartbeat.vehicle).filter(|&vehicle| !is_multirotor(vehicle))
+    }
+
     /// Its mode, `None` while not connected.
     #[must_use]
     pub fn mode(&self) -> Option<FlightMode> {
         let (heartbeat, _) = self.heartbeat.filter(|_| self.connected)?;
-        Some(FlightMode::from_custom_mode(Firmware::from_wire(heartbeat.autopilot), heartbeat.custom_mode))
+        Some(FlightMode::from_custom_mode(
+            Firmware::from_wire(heartbeat.autopilot),
+            heartbeat.vehicle,
+            heartbeat.custom_mode,
+        ))
     }
 
     /// Whether it is connected and in a mode in which position targets are obeyed.
@@ -130,31 +134,31 @@ impl Autopilot {
         self.heartbeat.map_or(SystemState::Uninitialised, |(heartbeat, _)| heartbeat.state)
     }
 
-    /// The failsafe that it reports now. After one, control must not be asked for again without the operator.
+    /// The failsafe that it reports now. After one, only the operator may give control back.
     #[must_use]
     pub const fn failsafe(&self) -> Option<Failsafe> {
         self.known.failsafe
     }
 
-    /// Where it is in the local frame, if told within `max_age`.
+    /// Position in the local frame, if reported within `max_age`.
     #[must_use]
     pub fn position(&self, now: Instant, max_age: Duration) -> Option<LocalPosition> {
         fresh(self.known.position, now, max_age)
     }
 
-    /// Where it is on the globe, if told within `max_age`.
+    /// Position on the globe, if reported within `max_age`.
     #[must_use]
     pub fn global_position(&self, now: Instant, max_age: Duration) -> Option<GlobalPosition> {
         fresh(self.known.global, now, max_age)
     }
 
-    /// Where the local frame's origin is.
+    /// Origin of the local frame.
     #[must_use]
     pub const fn origin(&self) -> Option<GlobalOrigin> {
         self.known.origin
     }
 
-    /// Where home is. Not the origin.
+    /// Home position. It is not the origin.
     #[must_use]
     pub const fn home(&self) -> Option<HomePosition> {
         self.known.home
@@ -172,7 +176,7 @@ impl Autopilot {
         self.known.battery.map(|(battery, _)| battery)
     }
 
-    /// Main battery left, percent, if told within `max_age`; `SYS_STATUS` fills in for `BATTERY_STATUS`.
+    /// Main battery left, percent, if reported within `max_age`; `SYS_STATUS` fills in for `BATTERY_STATUS`.
     #[must_use]
     pub fn battery_percent(&self, now: Instant, max_age: Duration) -> Option<u8> {
         fresh(self.known.battery, now, max_age)
@@ -180,7 +184,7 @@ impl Autopilot {
             .or_else(|| fresh(self.known.sys_battery_percent, now, max_age).flatten())
     }
 
-    /// Pulse of an RC channel (from 1), microseconds, if told within a second.
+    /// Pulse of an RC channel (from 1), microseconds, if reported within a second.
     #[must_use]
     pub fn rc_pulse_us(&self, now: Instant, channel: u8) -> Option<u16> {
         fresh(self.known.rc, now, Duration::from_secs(1)).and_then(|rc| rc.pulse_us(channel))
@@ -192,8 +196,8 @@ impl Autopilot {
         self.known.boot_ms
     }
 
-    /// Whether the estimator says that it knows where it is, the position is fresh (one second) and the origin
-    /// is known. The pre-arm bit of `SYS_STATUS` is no substitute: it can be set before there is a position.
+    /// Whether the estimator has a valid position, that position is fresh (one second) and the origin is known. The
+    /// pre-arm bit of `SYS_STATUS` is no substitute: it can be set before there is a position.
     #[must_use]
     pub fn is_ready(&self, now: Instant) -> bool {
         let flags = fresh(self.known.estimator_flags, now, Duration::from_secs(3));
@@ -201,7 +205,7 @@ impl Autopilot {
             Some(Firmware::ArduPilot) => {
                 flags.is_some_and(|flags| flags & ARDUPILOT_READY == ARDUPILOT_READY)
             }
-            // Its onboard profile does not always carry the report: absent, the position speaks for itself.
+            // Its onboard profile does not always include the report; without it, a fresh position is enough.
             Some(_) => flags.is_none_or(|flags| flags & PX4_READY == PX4_READY),
             None => false,
         };
@@ -211,7 +215,7 @@ impl Autopilot {
             && self.position(now, Duration::from_secs(1)).is_some()
     }
 
-    /// Takes in one message of the adopted system.
+    /// Takes in one message of the vehicle that we serve.
     pub(crate) fn observe(&mut self, now: Instant, sender: Address, message: &Message, events: &mut Events) {
         if let Message::Heartbeat(heartbeat) = message {
             if is_autopilot(heartbeat) && self.is_or_becomes(sender) {
@@ -256,7 +260,7 @@ impl Autopilot {
         self.known.streams.answered(now, result);
     }
 
-    /// Notices the loss of the autopilot, asks for streams.
+    /// Detects the loss of the autopilot and asks for streams.
     /// RC channels are asked for only if `wants_rc`.
     pub(crate) fn poll(&mut self, now: Instant, wants_rc: bool, out: &mut Outgoing, events: &mut Events) {
         let heard_at = self.heartbeat.map(|(_, at)| at);
@@ -274,7 +278,7 @@ impl Autopilot {
         }
     }
 
-    /// The first component of the system that speaks as an autopilot stays it until it is lost.
+    /// The first component of the system that sends as an autopilot remains the autopilot until it is lost.
     fn is_or_becomes(&mut self, sender: Address) -> bool {
         if !self.connected {
             self.address = Some(sender);
@@ -319,7 +323,7 @@ impl Autopilot {
         self.known.failsafe = failsafe;
     }
 
-    /// Its clock went back: it started again (wrapping after 49.7 days is not going back).
+    /// Detects a clock that went back: the autopilot restarted. A wrap after 49.7 days is not going back.
     fn watch_clock(&mut self, message: &Message, events: &mut Events) {
         let clock_ms = match message {
             Message::LocalPosition(position) => position.time_boot_ms,
@@ -343,11 +347,11 @@ fn fresh<T: Copy>(latest: Latest<T>, now: Instant, max_age: Duration) -> Option<
     latest.filter(|(_, at)| now.since(*at) <= max_age).map(|(value, _)| value)
 }
 
-/// A flight controller, judged by what it says of itself and not by its component id. Anything without an
-/// autopilot (8) is none, and neither are ground stations (6), companions (18), antenna trackers (5) and the
-/// peripherals of `MAV_TYPE`: gimbals, cameras, batteries and so on.
+/// Whether a heartbeat is a vehicle's flight controller. Judged by what it says of itself, not by its component id:
+/// it names an autopilot (`MAV_AUTOPILOT` other than 8, none), and its `MAV_TYPE` is a vehicle. Everything else is a
+/// peripheral or a ground station: gimbals, cameras, companions, antenna trackers and types that we do not know.
 pub(crate) fn is_autopilot(heartbeat: &Heartbeat) -> bool {
     const NO_AUTOPILOT: u8 = 8;
     heartbeat.autopilot != NO_AUTOPILOT
-        && !matches!(heartbeat.vehicle, 5 | 6 | 18 | 26 | 27 | 30..=34 | 36..=42 | 44 | 48 | 49)
+        && matches!(heartbeat.vehicle, 1..=4 | 7..=17 | 19..=25 | 28 | 29 | 35 | 43 | 45..=47)
 }

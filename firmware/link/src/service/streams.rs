@@ -1,10 +1,13 @@
-//! The messages that we need from the autopilot, asked for until they come.
+//! Requests for the messages that we need from the autopilot, until they arrive.
 //!
-//! ArduPilot sends nothing but heartbeats unless asked; PX4 sends most by itself, some too rarely. The answer to
-//! `MAV_CMD_SET_MESSAGE_INTERVAL` does not name the message, so one is asked for at a time.
+//! ArduPilot sends only heartbeats unless asked; PX4 sends most messages unasked, some of them too rarely. The answer
+//! to `MAV_CMD_SET_MESSAGE_INTERVAL` does not name the message, so one request is open at a time.
 
-use crate::requests::command_packet;
-use crate::{Address, CommandResult, Firmware, Message, Outgoing, Priority};
+use crate::address::Address;
+use crate::message::{CommandResult, Message};
+use crate::mode::Firmware;
+use crate::service::requests::command_packet;
+use crate::wire::outgoing::{Outgoing, Priority};
 use gleaner_units::{Duration, Instant};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega as dialect;
@@ -13,7 +16,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 struct Stream {
     message_id: u32,
     period: Duration,
-    /// The only firmware that has it; `None` for both.
+    /// The firmware that has it; `None` for both.
     only: Option<Firmware>,
 }
 
@@ -23,7 +26,7 @@ const fn stream(message_id: u32, rate_hz: u64, only: Option<Firmware>) -> Stream
 
 const COUNT: usize = 10;
 
-/// In the order of need.
+/// The most needed first.
 const STREAMS: [Stream; COUNT] = [
     stream(dialect::LOCAL_POSITION_NED_DATA::ID, 10, None),
     stream(dialect::EXTENDED_SYS_STATE_DATA::ID, 2, None),
@@ -37,7 +40,7 @@ const STREAMS: [Stream; COUNT] = [
     stream(dialect::RC_CHANNELS_DATA::ID, 5, None),
 ];
 
-/// Which row of [`STREAMS`] a message belongs to.
+/// Row of a message in [`STREAMS`].
 fn row_of(message: &Message) -> Option<usize> {
     let id = match message {
         Message::LocalPosition(_) => dialect::LOCAL_POSITION_NED_DATA::ID,
@@ -57,7 +60,7 @@ fn row_of(message: &Message) -> Option<usize> {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Progress {
-    /// An answer to our asking came, whatever it was.
+    /// The request was answered, with any result.
     answered: bool,
     seen_at: Option<Instant>,
     ask_at: Instant,
@@ -72,23 +75,23 @@ pub(crate) struct Wants {
     pub rc: bool,
 }
 
-/// How far the asking has come. A fresh one asks for everything.
+/// Progress of the requests. A fresh one asks for every stream.
 #[derive(Debug, Default)]
 pub(crate) struct Streams {
     progress: [Progress; COUNT],
-    /// The row asked for and not yet answered, and when.
+    /// The row of the open request, and when it was sent.
     asking: Option<(usize, Instant)>,
     origin_ask_at: Instant,
 }
 
 impl Streams {
-    /// How long to wait for the answer to one asking.
+    /// Time to wait for the answer to a request.
     const ANSWER: Duration = Duration::from_secs(1);
-    /// After an accepted one: how long until the message should have come.
+    /// After an accepted request: time until the message must have arrived.
     const ACCEPTED: Duration = Duration::from_secs(5);
-    /// After a refused one.
+    /// After a refused request: time until the next one.
     const REFUSED: Duration = Duration::from_secs(30);
-    /// A stream is dead when three periods, and at least this long, pass without it.
+    /// A stream has stopped when three periods, and at least this long, pass without a message.
     const DEAD: Duration = Duration::from_secs(3);
 
     /// A message of the autopilot arrived.
@@ -108,7 +111,7 @@ impl Streams {
         }
     }
 
-    /// Asks for the next stream that is missing, and what else is wanted.
+    /// Asks for the next missing stream, and for what else is wanted.
     pub fn poll(
         &mut self,
         now: Instant,
@@ -130,7 +133,7 @@ impl Streams {
                 && (wants.rc || stream.message_id != dialect::RC_CHANNELS_DATA::ID)
                 && self.progress.get(row).is_some_and(|progress| progress.needs_asking(now, stream))
         };
-        // The one that has waited longest; in the order of need among equals.
+        // The one that has waited longest; among equals, the first in the table.
         let waiting_since =
             |&(row, _): &(usize, &Stream)| self.progress.get(row).map(|progress| progress.ask_at);
         let next = STREAMS.iter().enumerate().filter(missing).min_by_key(waiting_since);

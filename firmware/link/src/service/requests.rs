@@ -1,57 +1,14 @@
-//! Commands of ours to the autopilot, repeated until acknowledged.
+//! Our commands to the autopilot, repeated until they are acknowledged.
 
-use crate::event::Events;
-use crate::{Address, CommandAck, CommandResult, Event, Outgoing, Packet, Priority};
-use gleaner_units::{Duration, Instant, MetresPerSecond};
+use crate::address::Address;
+use crate::autopilot_command::AutopilotCommand;
+use crate::event::{Event, Events, Outcome};
+use crate::message::{CommandAck, CommandResult};
+use crate::wire::outgoing::{Outgoing, Priority};
+use crate::wire::packet::Packet;
+use gleaner_units::{Duration, Instant};
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
-
-/// What we may ask of the autopilot. A mode in which we steer is not among it, on purpose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum AutopilotCommand {
-    /// `MAV_CMD_NAV_LAND`: land here.
-    Land,
-    /// `MAV_CMD_NAV_RETURN_TO_LAUNCH`.
-    ReturnToLaunch,
-    /// `MAV_CMD_DO_CHANGE_SPEED`, ground speed. PX4 accepts it without effect in OFFBOARD.
-    ChangeSpeed(MetresPerSecond),
-}
-
-/// How a request ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The autopilot accepted.
-    Accepted,
-    /// The autopilot refused.
-    Refused(CommandResult),
-    /// No acknowledgement after three transmissions.
-    NoAnswer,
-    /// A newer request of the same kind took its place.
-    Superseded,
-}
-
-impl AutopilotCommand {
-    /// The commands behind all of them: each moves the aircraft.
-    pub(crate) const KINDS: [MavCmd; 3] =
-        [MavCmd::MAV_CMD_NAV_LAND, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, MavCmd::MAV_CMD_DO_CHANGE_SPEED];
-
-    fn wire(self) -> (MavCmd, [f32; 3]) {
-        match self {
-            AutopilotCommand::Land => (MavCmd::MAV_CMD_NAV_LAND, [0.0; 3]),
-            AutopilotCommand::ReturnToLaunch => (MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, [0.0; 3]),
-            // 1: ground speed; throttle -1: no change.
-            AutopilotCommand::ChangeSpeed(speed) => (MavCmd::MAV_CMD_DO_CHANGE_SPEED, [1.0, speed.0, -1.0]),
-        }
-    }
-
-    pub(crate) fn is_finite(self) -> bool {
-        self.wire().1.iter().all(|param| param.is_finite())
-    }
-
-    fn is_same_kind(self, other: AutopilotCommand) -> bool {
-        self.wire().0 == other.wire().0
-    }
-}
 
 /// `COMMAND_LONG` to the autopilot.
 pub(crate) fn command_packet(
@@ -109,12 +66,12 @@ impl Requests {
         });
     }
 
-    /// Ends everything: the autopilot is gone or started again.
+    /// Ends all requests: the autopilot is lost or restarted.
     pub fn abandon(&mut self, events: &mut Events) {
         self.end(events, Outcome::NoAnswer, |_| true);
     }
 
-    /// The autopilot answered some command.
+    /// The autopilot answered a command.
     pub fn acknowledged(&mut self, now: Instant, ack: &CommandAck, events: &mut Events) {
         let is_it = |pending: &Pending| pending.command.wire().0 as u32 == u32::from(ack.command);
         let outcome = match ack.result {

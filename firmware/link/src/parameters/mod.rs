@@ -1,126 +1,15 @@
 //! The parameters of the product: names, ranges, defaults and values. Ground stations and settings files go
 //! through the same [`Parameters::set`].
 
+mod encoding;
+mod table;
+
+pub(crate) use encoding::decode;
+pub use table::{PARAMETERS, ParameterId, ParameterSpec};
+
 use core::fmt;
 use gleaner_units::{BatteryUnits, Decimal, Duration, Metres, MetresPerSecond};
-
-/// Which parameter; the order is that of the index on the wire and never changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[repr(u8)]
-pub enum ParameterId {
-    /// `GLN_W_DATA`.
-    DataWeight = 0,
-    /// `GLN_ENABLE`.
-    Enable = 1,
-    /// `GLN_ALT`.
-    Altitude = 2,
-    /// `GLN_SPEED`.
-    Speed = 3,
-    /// `GLN_RESERVE`.
-    Reserve = 4,
-    /// `GLN_BAT_UNITS`.
-    FullBattery = 5,
-    /// `GLN_ARRIVE_R`.
-    ArriveRadius = 6,
-    /// `GLN_SNR_AGE`.
-    SnrAge = 7,
-    /// `GLN_W_RC`.
-    DataWeightChannel = 8,
-}
-
-/// One row of the table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ParameterSpec {
-    /// Which.
-    pub id: ParameterId,
-    /// Name on the wire and in files, at most 16 characters.
-    pub name: &'static str,
-    /// Smallest allowed value.
-    pub min: f32,
-    /// Largest allowed value.
-    pub max: f32,
-    /// Value of a fresh installation.
-    pub default: f32,
-    /// Whether only whole numbers are allowed. All travel as `REAL32`.
-    pub whole: bool,
-    /// Unit, empty for none.
-    pub unit: &'static str,
-    /// One sentence.
-    pub doc: &'static str,
-}
-
-const fn row(
-    id: ParameterId,
-    name: &'static str,
-    [min, max, default]: [f32; 3],
-    whole: bool,
-    unit: &'static str,
-    doc: &'static str,
-) -> ParameterSpec {
-    ParameterSpec { id, name, min, max, default, whole, unit, doc }
-}
-
-/// How many parameters there are.
-const COUNT: usize = 9;
-
-/// All parameters, by index: `[min, max, default]`.
-#[rustfmt::skip]
-pub const PARAMETERS: [ParameterSpec; COUNT] = [
-    row(ParameterId::DataWeight, "GLN_W_DATA", [0.0, 1.0, 0.5], false, "",
-        "Preference: weight of data; energy gets 1 minus it. Takes effect at the next decision."),
-    row(ParameterId::Enable, "GLN_ENABLE", [0.0, 2.0, 0.0], true, "",
-        "0 off, 1 engage when the autopilot is in GUIDED or OFFBOARD, 2 shadow."),
-    row(ParameterId::Altitude, "GLN_ALT", [20.0, 120.0, 60.0], false, "m",
-        "Flight altitude above the take-off point."),
-    row(ParameterId::Speed, "GLN_SPEED", [1.0, 20.0, 10.0], false, "m/s",
-        "Horizontal speed asked of the autopilot."),
-    row(ParameterId::Reserve, "GLN_RESERVE", [0.0, 50.0, 2.0], false, "units",
-        "Battery units kept back on top of the way home."),
-    row(ParameterId::FullBattery, "GLN_BAT_UNITS", [1.0, 500.0, 100.0], false, "units",
-        "Battery units that a full battery is worth."),
-    row(ParameterId::ArriveRadius, "GLN_ARRIVE_R", [0.5, 10.0, 2.0], false, "m",
-        "Arrival radius of a cell centre."),
-    row(ParameterId::SnrAge, "GLN_SNR_AGE", [1.0, 600.0, 10.0], false, "s",
-        "Radio reports older than this are masked."),
-    row(ParameterId::DataWeightChannel, "GLN_W_RC", [0.0, 18.0, 0.0], true, "",
-        "RC channel mapped to the preference; 0 none."),
-];
-
-impl ParameterId {
-    /// Its row in the table.
-    #[must_use]
-    pub const fn spec(self) -> ParameterSpec {
-        match self {
-            ParameterId::DataWeight => PARAMETERS[0],
-            ParameterId::Enable => PARAMETERS[1],
-            ParameterId::Altitude => PARAMETERS[2],
-            ParameterId::Speed => PARAMETERS[3],
-            ParameterId::Reserve => PARAMETERS[4],
-            ParameterId::FullBattery => PARAMETERS[5],
-            ParameterId::ArriveRadius => PARAMETERS[6],
-            ParameterId::SnrAge => PARAMETERS[7],
-            ParameterId::DataWeightChannel => PARAMETERS[8],
-        }
-    }
-
-    /// The one with this name; case counts.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<ParameterId> {
-        PARAMETERS.iter().find(|spec| spec.name == name).map(|spec| spec.id)
-    }
-
-    /// The one with this index.
-    #[must_use]
-    pub fn from_index(index: u16) -> Option<ParameterId> {
-        PARAMETERS.get(usize::from(index)).map(|spec| spec.id)
-    }
-
-    /// Its index on the wire.
-    #[must_use]
-    pub const fn index(self) -> u16 {
-        self as u16
-    }
-}
+use table::COUNT;
 
 /// `GLN_ENABLE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -262,19 +151,19 @@ impl Parameters {
         Metres(self.value(ParameterId::Altitude))
     }
 
-    /// Horizontal speed to ask for.
+    /// Horizontal speed, commanded to the autopilot.
     #[must_use]
     pub fn speed(&self) -> MetresPerSecond {
         MetresPerSecond(self.value(ParameterId::Speed))
     }
 
-    /// Kept back on top of the way home.
+    /// Battery units kept beyond the way home.
     #[must_use]
     pub fn reserve(&self) -> BatteryUnits {
         BatteryUnits(self.value(ParameterId::Reserve))
     }
 
-    /// What a full battery is worth.
+    /// Battery units of a full battery.
     #[must_use]
     pub fn full_battery(&self) -> BatteryUnits {
         BatteryUnits(self.value(ParameterId::FullBattery))
@@ -292,6 +181,12 @@ impl Parameters {
         Duration::from_secs_f32(self.value(ParameterId::SnrAge))
     }
 
+    /// Whether the network looks ahead in the on-board model.
+    #[must_use]
+    pub fn looks_ahead(&self) -> bool {
+        self.value(ParameterId::Lookahead) != 0.0
+    }
+
     /// RC channel mapped to the preference, counted from 1.
     #[must_use]
     pub fn data_weight_channel(&self) -> Option<u8> {
@@ -307,7 +202,7 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn the_table_is_in_order_and_its_defaults_are_allowed() {
+    fn the_table_is_in_order_and_its_defaults_valid() {
         let mut parameters = Parameters::default();
         for (index, spec) in PARAMETERS.iter().enumerate() {
             assert_eq!(spec.id as usize, index);
@@ -323,11 +218,11 @@ mod tests {
                 );
             }
         }
-        assert_eq!(ParameterId::from_index(9), None);
+        assert_eq!(ParameterId::from_index(10), None);
     }
 
     #[test]
-    fn refused_values_change_nothing_and_say_why() {
+    fn refused_values_change_nothing() {
         let mut parameters = Parameters::default();
         let mut refuse = |name: &str, value: f32| {
             let before = parameters.clone();
@@ -348,7 +243,7 @@ mod tests {
         #![proptest_config(crate::seeded())]
 
         #[test]
-        fn whatever_is_asked_the_values_stay_inside(asks in proptest::collection::vec((0u16..9, any::<f32>()), 0..40)) {
+        fn values_stay_in_their_ranges(asks in proptest::collection::vec((0u16..10, any::<f32>()), 0..40)) {
             let mut parameters = Parameters::default();
             for (index, value) in asks {
                 let id = ParameterId::from_index(index).unwrap();

@@ -1,6 +1,8 @@
-//! Status texts: split, paced, the gravest kept.
+//! Status texts: split into chunks, limited in rate, the most severe kept.
 
-use crate::{Outgoing, Packet, Priority, Severity};
+use crate::message::Severity;
+use crate::wire::outgoing::{Outgoing, Priority};
+use crate::wire::packet::Packet;
 use core::fmt::{self, Write};
 use gleaner_units::{Duration, Instant};
 use heapless::{Deque, String, Vec};
@@ -18,13 +20,13 @@ struct Text {
     text: String<LONGEST>,
 }
 
-/// Texts that wait for their turn: at most ten chunks a second.
+/// Texts that wait: at most ten chunks a second leave.
 #[derive(Debug, Default)]
 pub(crate) struct Texts {
     waiting: Deque<Text, 8>,
     /// Chunks of the first text that have left.
     chunks_sent: u8,
-    /// Ties the chunks of one text together; 0 is for texts of one chunk.
+    /// Id that joins the chunks of one text; 0 is for texts of one chunk.
     last_id: u16,
     next_at: Instant,
     pub dropped: u32,
@@ -45,7 +47,7 @@ impl Write for Truncated<'_> {
 impl Texts {
     const INTERVAL: Duration = Duration::from_millis(100);
 
-    /// Queues a text. When there is no room, the least grave of the waiting ones goes, or this one.
+    /// Queues a text. When the queue is full, the least severe text is dropped: a waiting one, or this one.
     pub fn say(&mut self, severity: Severity, text: fmt::Arguments<'_>) {
         let mut held = String::new();
         let _ = Truncated(&mut held).write_fmt(text);
@@ -58,13 +60,13 @@ impl Texts {
         let _ = self.waiting.push_back(Text { severity, text: held });
     }
 
-    /// Drops the newest of the least grave waiting texts if it is less grave than `severity`. Never the first,
-    /// of which a part may have left.
+    /// Drops the newest of the least severe waiting texts if it is less severe than `severity`. Never the first, of
+    /// which a part may have left.
     fn make_room(&mut self, severity: Severity) -> bool {
         let least = self.waiting.iter().skip(1).map(|text| text.severity).max();
         let Some(least) = least.filter(|&least| least > severity) else { return false };
         let Some(last) = self.waiting.iter().rposition(|text| text.severity == least) else { return false };
-        // Once around, without the one: `Deque::retain` can panic as far as a linker can tell.
+        // Rotates the queue once without that text: the linker cannot prove that `Deque::retain` does not panic.
         for at in 0..self.waiting.len() {
             if let Some(text) = self.waiting.pop_front().filter(|_| at != last) {
                 let _ = self.waiting.push_back(text);
@@ -89,7 +91,7 @@ impl Texts {
         }
         self.next_at = now + Texts::INTERVAL;
         self.chunks_sent += 1;
-        // A chunk that is full to the last byte has no NUL; an empty one more ends the text.
+        // A full chunk has no NUL, so an empty chunk ends the text.
         let ended = !is_long || usize::from(self.chunks_sent) * CHUNK > first.text.len();
         if ended {
             let _ = self.waiting.pop_front();
