@@ -94,8 +94,12 @@ impl FakeAutopilot {
     }
 
     fn send(&mut self, message: &impl MessageData) {
+        self.send_as(AUTOPILOT, message);
+    }
+
+    fn send_as(&mut self, sender: Address, message: &impl MessageData) {
         self.sequence = self.sequence.wrapping_add(1);
-        let frame = Packet::new(message).unwrap().frame(AUTOPILOT, self.sequence);
+        let frame = Packet::new(message).unwrap().frame(sender, self.sequence);
         self.socket.send(&frame).unwrap();
     }
 
@@ -167,13 +171,15 @@ impl FakeAutopilot {
     }
 
     fn ask_for_shadow(&mut self) {
-        self.send(&COMMAND_LONG_DATA {
+        let shadow = COMMAND_LONG_DATA {
             target_system: GLEANER.system,
             target_component: GLEANER.component,
             command: MavCmd::MAV_CMD_USER_2,
             param1: 2.0,
             ..COMMAND_LONG_DATA::DEFAULT
-        });
+        };
+        // A ground station, by way of the autopilot's port.
+        self.send_as(Address::new(255, 190), &shadow);
     }
 
     /// Goes on until a decision record comes.
