@@ -87,7 +87,8 @@ fn check_names_the_engine() {
         ("models/gleaner.onnx", "tract", "ok    engine     tract"),
     ] {
         let dist = "firmware/companion/dist/gleaner.toml";
-        let mut arguments = vec!["check", "--config", dist, "--model", model, "--engine", engine];
+        let mut arguments =
+            vec!["check", "--wait", "0", "--config", dist, "--model", model, "--engine", engine];
         arguments.extend(["--autopilot", "udpin:127.0.0.1:0", "--radio", "udp:127.0.0.1:0"]);
         arguments.extend(["--log", folder.path().to_str().unwrap()]);
         let said = stdout(&gleaner("gleaner", &arguments));

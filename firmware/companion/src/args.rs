@@ -1,6 +1,6 @@
-//! The command line as it was typed in. Nothing is opened here.
+//! The command line as it was typed. Nothing is opened here.
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use gleaner_policy::EngineKind;
 use gleaner_policy::native::WeightFormat;
@@ -8,7 +8,7 @@ use gleaner_ports::Endpoint;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Gathers data from sensors on the ground with a drone: the pilot on its companion computer.
+/// The pilot on a drone's companion computer: gathers data from ground sensors.
 #[derive(Parser)]
 #[command(name = "gleaner", version, arg_required_else_help = true)]
 struct CommandLine {
@@ -20,22 +20,22 @@ struct CommandLine {
 #[derive(Subcommand)]
 pub enum Command {
     /// Serve an autopilot until interrupted. Engages only on request of the operator (GLN_ENABLE).
-    Run(Setup),
-    /// Check configuration, mission, model and ports, and say what to do about each fault.
+    Run(Run),
+    /// Check configuration, mission, model and ports, and print what to do about each fault.
     Check {
         #[command(flatten)]
         setup: Setup,
-        /// Seconds to wait for a heartbeat of the autopilot; 0 does not wait.
-        #[arg(long = "wait", value_name = "SECONDS", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..=3600))]
+        /// Seconds to listen for a heartbeat of the autopilot; 0 does not listen.
+        #[arg(long = "wait", value_name = "SECONDS", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=3600))]
         wait_s: u64,
     },
-    /// Time one inference in each engine, side by side.
+    /// Time one inference in each engine.
     Bench(Bench),
-    /// Convert a model for the native engine, and let it prove itself there.
+    /// Convert a model for the native engine and verify the result.
     Convert(Conversion),
-    /// List the parameters that a ground station will see, with the values that a configuration gives them.
+    /// List the parameters that a ground station will see, with the values of a configuration.
     Params {
-        /// Configuration file; without it the values of a fresh installation.
+        /// Configuration file; without it the default values.
         #[arg(long, value_name = "FILE")]
         config: Option<PathBuf>,
     },
@@ -43,17 +43,51 @@ pub enum Command {
     Ports,
     /// Replay a decision log of `gleaner` or `gleaner-sitl` and list the decisions that change.
     Replay(Replay),
+    /// Make an ONNX model of your own flyable: check it, add golden pairs, seal it.
+    Seal(Sealing),
 }
 
-/// A flight to decide again.
+/// A model to seal.
+#[derive(Args)]
+pub struct Sealing {
+    /// The exported policy (.onnx).
+    pub model: PathBuf,
+    /// The file to write (.onnx).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Name of the model, as it is shown before a flight.
+    #[arg(long, value_name = "NAME")]
+    pub name: String,
+    /// Version of the model.
+    #[arg(long = "model-version", value_name = "VERSION", default_value = "1")]
+    pub model_version: String,
+    /// What it was trained in.
+    #[arg(long, value_name = "TEXT", default_value = "unknown")]
+    pub scenario: String,
+}
+
+/// A run.
+#[derive(Args)]
+pub struct Run {
+    #[command(flatten)]
+    pub setup: Setup,
+    /// Forget the parameters that were set from a ground station.
+    #[arg(long)]
+    pub reset_parameters: bool,
+    /// Print one line for each decision, and the traffic of the ports.
+    #[arg(long, short)]
+    pub verbose: bool,
+}
+
+/// A log to replay.
 #[derive(Args)]
 pub struct Replay {
     /// The decision log (decisions.jsonl).
     pub log: PathBuf,
-    /// The trained policy.
+    /// The trained policy [default: the built-in one].
     #[arg(long, value_name = "FILE")]
-    pub model: PathBuf,
-    /// What runs it: tract or native.
+    pub model: Option<PathBuf>,
+    /// The engine: tract or native.
     #[arg(long, value_name = "ENGINE", default_value = "tract")]
     pub engine: EngineKind,
 }
@@ -61,10 +95,10 @@ pub struct Replay {
 /// A model to time.
 #[derive(Args)]
 pub struct Bench {
-    /// The trained policy (.onnx).
+    /// The trained policy (.onnx) [default: the built-in one].
     #[arg(long, value_name = "FILE")]
-    pub model: PathBuf,
-    /// How many inferences of each kind.
+    pub model: Option<PathBuf>,
+    /// Number of inferences of each kind.
     #[arg(long, value_name = "NUMBER", default_value_t = 501, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub inferences: u32,
 }
@@ -77,36 +111,42 @@ pub struct Conversion {
     /// The file to write (.gln).
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// How weights are stored: f32 or i16.
+    /// Format of the weights: f32 or i16.
     #[arg(long, value_name = "FORMAT", default_value = "f32", value_parser = weights)]
     pub weights: WeightFormat,
 }
 
-/// Where everything is. A flag overrides the configuration file; its paths are relative to the current folder.
+/// Files and ports. A flag overrides the configuration file; paths in flags are relative to the current folder.
 #[derive(Args, Default)]
 pub struct Setup {
     /// Configuration file; paths in it are relative to it.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Port to the autopilot: udpin:HOST:PORT, udpout:HOST:PORT, tcpin:HOST:PORT, tcpout:HOST:PORT or
+    /// Port to the autopilot: udpin:HOST:PORT, udpout:HOST:PORT, udpbcast:HOST:PORT, tcpin:HOST:PORT, tcpout:HOST:PORT or
     /// serial:PATH[:BAUD].
     #[arg(long, value_name = "ENDPOINT")]
     pub autopilot: Option<Endpoint>,
-    /// Port to the radio that reports signal quality, in the same words; udp: is udpin:.
+    /// Another port, to a ground station; may be given several times. Messages are routed between the ports.
+    #[arg(long, value_name = "ENDPOINT")]
+    pub ground: Vec<Endpoint>,
+    /// Port to the radio that reports signal quality.
     #[arg(long, value_name = "ENDPOINT")]
     pub radio: Option<Endpoint>,
-    /// The trained policy.
+    /// The trained policy [default: the built-in one].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// What runs it: tract or native.
+    /// The engine: tract or native.
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<EngineKind>,
     /// The mission.
     #[arg(long, value_name = "FILE")]
     pub mission: Option<PathBuf>,
-    /// Folder for the decision log, decisions.jsonl.
+    /// Folder for decisions.jsonl and flight.tlog.
     #[arg(long = "log", value_name = "FOLDER")]
     pub log_dir: Option<PathBuf>,
+    /// Folder for what outlives a run: parameters set from a ground station, and how the last run ended.
+    #[arg(long = "state", value_name = "FOLDER")]
+    pub state_dir: Option<PathBuf>,
 }
 
 fn weights(name: &str) -> Result<WeightFormat, String> {
@@ -116,7 +156,7 @@ fn weights(name: &str) -> Result<WeightFormat, String> {
 /// Reads the command line of this process.
 ///
 /// # Errors
-/// The exit code, after help was printed or the fault was said.
+/// The exit code, after the help or the fault was printed.
 pub fn parse() -> Result<Command, ExitCode> {
     match CommandLine::try_parse() {
         Ok(line) => Ok(line.command),
@@ -127,22 +167,34 @@ pub fn parse() -> Result<Command, ExitCode> {
 fn answer(error: &clap::Error) -> ExitCode {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            // Nobody to tell if the help itself cannot be printed.
+            // A closed stdout takes no message about itself.
             let _ = error.print();
             ExitCode::SUCCESS
         }
         ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            eprintln!("gleaner: nothing to do: give a command, for example `gleaner check`, or --help");
+            eprintln!("gleaner: no command: type one, for example `gleaner check`, or --help");
             ExitCode::from(2)
         }
         _ => {
-            eprintln!("gleaner: {}: see `gleaner --help`", one_line(&error.to_string()));
+            eprintln!("gleaner: {}: {}", one_line(&error.to_string()), advice(error));
             ExitCode::from(2)
         }
     }
 }
 
-/// The cause without the usage and the tips that follow it.
+/// The nearest right word, or the help.
+fn advice(error: &clap::Error) -> String {
+    let suggested =
+        [ContextKind::SuggestedSubcommand, ContextKind::SuggestedArg, ContextKind::SuggestedValue];
+    let word = suggested.into_iter().find_map(|kind| match error.get(kind)? {
+        ContextValue::String(word) => Some(word.clone()),
+        ContextValue::Strings(words) => words.first().cloned(),
+        _ => None,
+    });
+    word.map_or_else(|| "see `gleaner --help`".to_owned(), |word| format!("did you mean {word}?"))
+}
+
+/// The cause, without the usage and the tips that follow it.
 fn one_line(text: &str) -> String {
     let cause = text.split("\n\n").next().unwrap_or(text);
     let words: Vec<&str> = cause.split_whitespace().collect();
@@ -160,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_endpoint_is_one_line_that_shows_a_right_one() {
+    fn a_wrong_endpoint_gets_the_right_one_suggested() {
         let Err(error) = CommandLine::try_parse_from(["gleaner", "run", "--autopilot", "1.2.3.4:5"]) else {
             panic!("accepted");
         };

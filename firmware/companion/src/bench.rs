@@ -1,4 +1,4 @@
-//! `gleaner bench`: how long one inference takes in each engine, side by side.
+//! `gleaner bench`: the time of one inference in each engine.
 
 use crate::args::Bench;
 use crate::error::StartError;
@@ -13,8 +13,9 @@ use std::time::{Duration, Instant};
 /// # Errors
 /// The model cannot be loaded in both engines.
 pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
-    let [mut tract, mut native] =
-        [load::model(&order.model, EngineKind::Tract)?, load::model(&order.model, EngineKind::Native)?];
+    let [tract, native] =
+        [EngineKind::Tract, EngineKind::Native].map(|kind| load::model(order.model.as_deref(), kind));
+    let [mut tract, mut native] = [tract?, native?];
     let mut pairs: Vec<&Golden> = Vec::new();
     let goldens = native.goldens().to_vec();
     for golden in &goldens {
@@ -22,7 +23,7 @@ pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
             pairs.push(golden);
         }
     }
-    println!("{} {}, {} inferences each, in turns; us", native.name(), native.version(), order.inferences);
+    println!("{} {}, {} inferences each, alternating; us", native.name(), native.version(), order.inferences);
     println!("devices    tract minimum  median    native minimum  median    ratio of medians");
     for golden in pairs {
         let [mut slow, mut fast] = [Times::default(), Times::default()];
@@ -40,14 +41,14 @@ pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// How long each inference took.
+/// The duration of each inference.
 #[derive(Default)]
 struct Times(Vec<Duration>);
 
 impl Times {
     fn add(&mut self, engine: &mut Engine, golden: &Golden) {
         let start = Instant::now();
-        // That it answers these was proven when it was loaded.
+        // Its answers were verified when it was loaded.
         let _ = black_box(engine.infer(black_box(&golden.tokens)));
         self.0.push(start.elapsed());
     }

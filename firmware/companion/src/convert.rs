@@ -2,18 +2,18 @@
 
 use crate::args::Conversion;
 use crate::error::StartError;
+use crate::load;
 use gleaner_policy::onnx;
 use std::fs;
 use std::process::ExitCode;
 
-/// Writes the file, after the native engine reproduced the golden pairs with it.
+/// Writes the file, after the native engine has reproduced the golden pairs with it.
 ///
 /// # Errors
 /// The model cannot be read or converted, or the file cannot be written.
 pub fn convert(conversion: &Conversion) -> Result<ExitCode, StartError> {
     let (path, out) = (&conversion.model, &conversion.out);
-    let bytes =
-        fs::read(path).map_err(|source| StartError::Read { what: "model", path: path.clone(), source })?;
+    let bytes = load::model_bytes(Some(path))?;
     let blob = onnx::convert(&bytes, conversion.weights)
         .map_err(|source| StartError::Convert { path: path.clone(), source })?;
     fs::write(out, &blob).map_err(|source| StartError::Write { path: out.clone(), source })?;

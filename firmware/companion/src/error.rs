@@ -1,6 +1,9 @@
-//! Why the program cannot run: what, where, what to do. All end it with exit code 2.
+//! Why the program cannot run: what, where, what to do. Every error ends it with exit code 2.
 
 use crate::config::ConfigError;
+use crate::routing::SigningError;
+use crate::seal::SealError;
+use crate::text::TextFault;
 use gleaner_pilot::OnboardError;
 use gleaner_pilot::mission_file::MissionFileError;
 use gleaner_policy::onnx::{ConvertError, ModelError};
@@ -24,6 +27,16 @@ pub enum StartError {
         /// Why.
         source: io::Error,
     },
+    /// A file is not text.
+    #[error("{what} {}: {source}", .path.display())]
+    Text {
+        /// Which kind of file.
+        what: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What.
+        source: TextFault,
+    },
     /// The mission file is wrong.
     #[error("mission {}: {source}", .path.display())]
     Mission {
@@ -32,7 +45,7 @@ pub enum StartError {
         /// What.
         source: MissionFileError,
     },
-    /// Mission and settings, each good for itself, make no pilot together.
+    /// Mission and settings are good each, but not together.
     #[error("{}: {source}: correct it", .path.display())]
     Refused {
         /// The mission.
@@ -40,7 +53,7 @@ pub enum StartError {
         /// What.
         source: OnboardError,
     },
-    /// The model is not fit to fly.
+    /// The model may not fly.
     #[error("model {}: {source}", .path.display())]
     Model {
         /// Where.
@@ -48,7 +61,7 @@ pub enum StartError {
         /// What.
         source: ModelError,
     },
-    /// The model has no form for the native engine.
+    /// The model cannot be converted for the native engine.
     #[error("model {}: {source}", .path.display())]
     Convert {
         /// Where.
@@ -56,24 +69,48 @@ pub enum StartError {
         /// Why.
         source: ConvertError,
     },
+    /// The model cannot be sealed.
+    #[error("model {}: {source}", .path.display())]
+    Seal {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: SealError,
+    },
     /// A result cannot be written.
-    #[error("{}: cannot be written: {source}: give another path with --out, or its permissions", .path.display())]
+    #[error("{}: cannot be written: {source}: give another path with --out, or correct its permissions", .path.display())]
     Write {
         /// Where.
         path: PathBuf,
         /// Why.
         source: io::Error,
     },
-    /// The decision log cannot be written.
-    #[error("decision log {}: {source}: give another folder with --log, or its permissions", .path.display())]
+    /// A log cannot be written.
+    #[error("log {}: {source}: give another folder with --log, or correct its permissions", .path.display())]
     Log {
         /// Where.
         path: PathBuf,
         /// Why.
         source: io::Error,
     },
-    /// There is nothing to decide again.
-    #[error("decision log {}: holds no decision: give the decisions.jsonl that `gleaner run --log` wrote", .path.display())]
+    /// A port cannot sign.
+    #[error("signing {}: {source}", .path.display())]
+    Signing {
+        /// The key file, or the file of the timestamps.
+        path: PathBuf,
+        /// What.
+        source: SigningError,
+    },
+    /// The state folder cannot be used.
+    #[error("state {}: {source}: give another folder with --state, or correct its permissions", .path.display())]
+    State {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The log holds no decision.
+    #[error("decision log {}: holds no decision: give a decisions.jsonl of `gleaner run` or `gleaner-sitl`", .path.display())]
     NoDecisions {
         /// Where.
         path: PathBuf,
@@ -81,12 +118,12 @@ pub enum StartError {
     /// A port cannot be opened.
     #[error("{role} port {source}")]
     Port {
-        /// What it is for.
+        /// Its purpose.
         role: &'static str,
         /// What.
         source: PortError,
     },
     /// Interrupts cannot be caught.
-    #[error("cannot catch interrupts: {0}: start the program outside of what blocks its signals")]
+    #[error("cannot catch interrupts: {0}: start the program where signals are not blocked")]
     Signals(io::Error),
 }

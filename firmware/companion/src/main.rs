@@ -1,10 +1,10 @@
 //! `gleaner`: the pilot on a Linux companion computer.
 //!
-//! This program wires and reports: it opens ports and files, feeds bytes and the time to
-//! [`gleaner_pilot::Onboard`], and carries its bytes away. Nothing is decided here.
+//! The program opens ports and files, hands bytes and the time to [`gleaner_pilot::Onboard`], and sends what comes
+//! back. All decisions are made there.
 //!
-//! Exit codes: 0 done, 1 ran but the verdict is negative (`check`, `replay`), 2 could not run. An error is one line on
-//! stderr: what, where, what to do.
+//! Exit codes: 0 done, 1 the verdict is negative (`check`, `replay`), 2 could not run. An error is one line on stderr:
+//! what, where, what to do.
 
 mod args;
 mod bench;
@@ -13,29 +13,35 @@ mod clock;
 mod config;
 mod convert;
 mod error;
+mod keep;
 mod load;
-mod log;
+mod logs;
 mod params;
 mod ports;
 mod replay;
+mod routing;
 mod run;
+mod seal;
+mod text;
 
+use args::Command;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let command = args::parse();
-    if !matches!(command, Ok(args::Command::Run(_))) {
-        // `check | head` ends quietly. What flies must outlive whoever reads its messages.
+    if !matches!(command, Ok(Command::Run(_))) {
+        // `check | head` ends quietly. `run` must not end because a reader of its messages does.
         sigpipe::reset();
     }
     let outcome = match command {
-        Ok(args::Command::Run(setup)) => run::run(&setup),
-        Ok(args::Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
-        Ok(args::Command::Bench(order)) => bench::bench(&order),
-        Ok(args::Command::Convert(conversion)) => convert::convert(&conversion),
-        Ok(args::Command::Params { config }) => params::params(config.as_deref()),
-        Ok(args::Command::Ports) => Ok(ports::ports()),
-        Ok(args::Command::Replay(order)) => replay::replay(&order),
+        Ok(Command::Run(order)) => run::run(&order),
+        Ok(Command::Check { setup, wait_s }) => check::check(&setup, wait_s),
+        Ok(Command::Bench(order)) => bench::bench(&order),
+        Ok(Command::Convert(order)) => convert::convert(&order),
+        Ok(Command::Params { config }) => params::params(config.as_deref()),
+        Ok(Command::Ports) => Ok(ports::ports()),
+        Ok(Command::Replay(order)) => replay::replay(&order),
+        Ok(Command::Seal(order)) => seal::run(&order),
         Err(answered) => return answered,
     };
     outcome.unwrap_or_else(|error| {

@@ -1,4 +1,4 @@
-//! `gleaner params`: the parameters that a ground station will see, and what a configuration makes of them.
+//! `gleaner params`: the parameters that a ground station will see, and the values that a configuration gives them.
 
 use crate::config;
 use crate::error::StartError;
@@ -6,7 +6,7 @@ use gleaner_link::{PARAMETERS, Parameters};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Prints each parameter with the value that it would have after the start.
+/// Prints each parameter with the value that it has after the start.
 ///
 /// # Errors
 /// The configuration cannot be read, or a value in it is out of range.

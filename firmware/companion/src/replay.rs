@@ -23,8 +23,13 @@ const SHOWN: u64 = 10;
 pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
     let unreadable = |source| StartError::Read { what: "decision log", path: order.log.clone(), source };
     let log = BufReader::new(File::open(&order.log).map_err(unreadable)?);
-    let engine = load::model(&order.model, order.engine)?;
-    println!("{}, engine {} ({})", engine.name(), order.engine.name(), order.model.display());
+    let engine = load::model(order.model.as_deref(), order.engine)?;
+    println!(
+        "{}, engine {} ({})",
+        engine.name(),
+        order.engine.name(),
+        load::model_name(order.model.as_deref()).display()
+    );
     let mut comparison = Comparison { engine, findings: Findings::default() };
     for (index, line) in log.split(b'\n').enumerate() {
         let line = line.map_err(unreadable)?;

@@ -1,5 +1,4 @@
-//! Every bad input at the start: exit code 2, nothing on stdout, one line on stderr that says what, where and
-//! what to do.
+//! Every bad input at the start: exit code 2, nothing on stdout, one line on stderr: what, where, what to do.
 
 mod fixture;
 
@@ -207,7 +206,7 @@ fn logs_that_cannot_be_written() {
         fixture.write("occupied", "a file, not a folder");
         gleaner.arg("--log").arg(fixture.path("occupied"));
     });
-    says(&line, &["decision log ", "occupied/decisions.jsonl: ", "give another folder with --log"]);
+    says(&line, &["log ", "occupied/decisions.jsonl: ", "give another folder with --log"]);
 }
 
 #[test]
@@ -217,10 +216,13 @@ fn command_lines() {
         gleaner.args(args);
         gleaner
     };
-    says(&refused(&mut gleaner(&[])), &["give a command, for example `gleaner check`"]);
+    says(&refused(&mut gleaner(&[])), &["no command: type one, for example `gleaner check`"]);
     says(&refused(&mut gleaner(&["fly"])), &["unrecognized subcommand 'fly'", "see `gleaner --help`"]);
-    says(&refused(&mut gleaner(&["run", "--modle", "x"])), &["unexpected argument '--modle'"]);
-    says(&refused(&mut gleaner(&["run"])), &["no model is set: give --model"]);
+    says(
+        &refused(&mut gleaner(&["run", "--modle", "x"])),
+        &["unexpected argument '--modle'", "did you mean --model?"],
+    );
+    says(&refused(&mut gleaner(&["run"])), &["no mission is set: give --mission"]);
     says(&refused(&mut gleaner(&["check", "--wait", "soon"])), &["--wait"]);
     let (code, stdout, stderr) = outcome(&gleaner(&["--help"]).output().unwrap());
     assert_eq!((code, stderr.as_str()), (Some(0), ""));

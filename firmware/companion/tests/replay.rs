@@ -1,4 +1,4 @@
-//! `gleaner replay`: what was decided is decided again, and what is decided otherwise is said.
+//! `gleaner replay`: decisions are made again, and those that change are listed.
 
 mod fixture;
 
@@ -27,7 +27,7 @@ fn replay(text: &str) -> (Option<i32>, String, String) {
     outcome(&replay.env_remove("RUST_BACKTRACE").output().unwrap())
 }
 
-/// As logged, otherwise, by the guard, skipped; and how far logits are apart.
+/// Equal, different, by the guard, skipped; and the largest difference of a logit.
 fn counts(stdout: &str) -> Vec<&str> {
     let lines: Vec<&str> = stdout.lines().collect();
     lines[lines.len() - 5..].iter().filter_map(|line| line.split_whitespace().last()).collect()
@@ -44,19 +44,19 @@ fn decisions_as_logged_are_counted() {
 }
 
 #[test]
-fn a_decision_that_is_made_otherwise_is_named_and_the_verdict_is_negative() {
+fn a_decision_that_changes_is_listed_and_makes_the_verdict() {
     let mut other = line(1);
     other["action"] = json!("east");
     other["logits"] = json!([4.5, 4.0, 3.0, 2.0, 5.0]);
     let (code, stdout, stderr) = replay(&format!("{}\n{other}\n", line(0)));
     assert_eq!((code, stderr.as_str()), (Some(1), ""), "{stdout}");
-    let told = "run 7, decision 1: logged east, now hover; logits differ by up to 4.0e0";
-    assert!(stdout.lines().any(|line| line == told), "{stdout}");
+    let expected = "run 7, decision 1: logged east, now hover; logits differ by up to 4.0e0";
+    assert!(stdout.lines().any(|line| line == expected), "{stdout}");
     assert_eq!(counts(&stdout), ["1", "1", "0", "0", "4.0e0"]);
 }
 
 #[test]
-fn the_guard_that_flew_is_the_guard_of_the_replay() {
+fn the_logged_mask_applies_to_the_replay() {
     // The model prefers to hover, which was not allowed.
     let mut masked = line(0);
     masked["mask"] = json!(["east", "north"]);
@@ -66,7 +66,7 @@ fn the_guard_that_flew_is_the_guard_of_the_replay() {
 }
 
 #[test]
-fn a_log_of_the_guards_decisions_alone_proves_nothing() {
+fn a_log_without_decisions_of_the_model_fails() {
     let mut guards = line(0);
     guards["logits"] = Value::Null;
     let (code, stdout, _) = replay(&guards.to_string());
@@ -74,7 +74,7 @@ fn a_log_of_the_guards_decisions_alone_proves_nothing() {
 }
 
 #[test]
-fn half_a_line_is_skipped_and_said() {
+fn half_a_line_is_skipped_and_reported() {
     let whole = line(0).to_string();
     let (code, stdout, _) = replay(&format!("{}\n{whole}\n", &whole[..100]));
     assert_eq!(code, Some(0), "{stdout}");
@@ -83,7 +83,7 @@ fn half_a_line_is_skipped_and_said() {
 }
 
 #[test]
-fn what_is_no_decision_log_is_refused_in_one_line() {
+fn other_files_are_refused_in_one_line() {
     for text in ["", "\n\n", "not a log\n", "{}\n"] {
         let (code, _, stderr) = replay(text);
         assert_eq!((code, stderr.lines().count()), (Some(2), 1), "{text:?}: {stderr}");

@@ -1,200 +1,17 @@
-//! `gleaner run` as a process, with this test as its autopilot and its radio. Nothing sleeps: each wait is for
-//! bytes or for a line on stderr.
+//! `gleaner run` as a process.
 
 mod fixture;
 
+use fixture::vehicle::{FakeAutopilot, GLEANER, Process, Running};
 use fixture::{Fixture, LOGITS};
-use gleaner_link::{Address, FrameDecoder, Message, Packet, TUNNEL_DECISION};
+use gleaner_link::{Message, TUNNEL_DECISION};
 use gleaner_policy::LOCAL_MAP_CELLS;
-use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::*;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, UdpSocket};
-use std::process::{Child, ChildStderr, Command, Stdio};
-use std::time::Duration;
-
-const AUTOPILOT: Address = Address::new(7, 1);
-const GLEANER: Address = Address::new(7, 191);
-
-/// Killed when a test fails.
-struct Process(Child);
-
-/// The process, and what it says.
-struct Running {
-    process: Process,
-    stderr: BufReader<ChildStderr>,
-}
-
-impl Running {
-    fn start(gleaner: &mut Command) -> Running {
-        let mut child = gleaner.stderr(Stdio::piped()).spawn().unwrap();
-        let stderr = BufReader::new(child.stderr.take().unwrap());
-        Running { process: Process(child), stderr }
-    }
-
-    /// Reads stderr up to a line that contains `part`.
-    #[track_caller]
-    fn says(&mut self, part: &str) -> String {
-        let mut so_far = String::new();
-        loop {
-            let start = so_far.len();
-            assert_ne!(self.stderr.read_line(&mut so_far).unwrap(), 0, "it ended without {part:?}: {so_far}");
-            if so_far[start..].contains(part) {
-                return so_far[start..].trim_end().to_owned();
-            }
-        }
-    }
-
-    /// Asks it to end; its exit code and what it said until then.
-    fn stop(self) -> (Option<i32>, String) {
-        self.stop_by("TERM")
-    }
-
-    fn stop_by(mut self, name: &str) -> (Option<i32>, String) {
-        self.process.signal(name);
-        let mut rest = String::new();
-        while self.stderr.read_line(&mut rest).unwrap() > 0 {}
-        (self.process.0.wait().unwrap().code(), rest)
-    }
-}
-
-impl Process {
-    fn signal(&self, name: &str) {
-        let kill = format!("kill -{name} {}", self.0.id());
-        assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        // Fails when it has ended already, as it should.
-        let _ = self.0.kill();
-    }
-}
-
-/// What an ArduCopter says.
-struct FakeAutopilot {
-    socket: UdpSocket,
-    decoder: FrameDecoder,
-    sequence: u8,
-}
-
-impl FakeAutopilot {
-    /// Connects to where the process says that it listens.
-    fn find(running: &mut Running) -> FakeAutopilot {
-        FakeAutopilot::at(&running.says("local address "))
-    }
-
-    /// Connects to the address at the end of the line.
-    fn at(line: &str) -> FakeAutopilot {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-        socket.connect(line.split("local address ").last().unwrap()).unwrap();
-        socket.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-        FakeAutopilot { socket, decoder: FrameDecoder::new(), sequence: 0 }
-    }
-
-    fn send(&mut self, message: &impl MessageData) {
-        self.send_as(AUTOPILOT, message);
-    }
-
-    fn send_as(&mut self, sender: Address, message: &impl MessageData) {
-        self.sequence = self.sequence.wrapping_add(1);
-        let frame = Packet::new(message).unwrap().frame(sender, self.sequence);
-        self.socket.send(&frame).unwrap();
-    }
-
-    /// Armed in GUIDED, 60 m over the centre of cell (1, 0), with half of its battery.
-    fn send_state(&mut self) {
-        self.send(&HEARTBEAT_DATA {
-            custom_mode: 4,
-            mavtype: MavType::MAV_TYPE_QUADROTOR,
-            autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
-            base_mode: MavModeFlag::from_bits_truncate(0xD9),
-            system_status: MavState::MAV_STATE_ACTIVE,
-            mavlink_version: 3,
-        });
-        self.send(&GPS_GLOBAL_ORIGIN_DATA {
-            latitude: -353_632_621,
-            longitude: 1_491_652_374,
-            altitude: 600_000,
-            ..GPS_GLOBAL_ORIGIN_DATA::DEFAULT
-        });
-        self.send(&HOME_POSITION_DATA {
-            latitude: -353_632_621,
-            longitude: 1_491_652_374,
-            altitude: 600_000,
-            ..HOME_POSITION_DATA::DEFAULT
-        });
-        self.send(&EKF_STATUS_REPORT_DATA {
-            flags: EkfStatusFlags::from_bits_truncate(0x33F),
-            ..EKF_STATUS_REPORT_DATA::DEFAULT
-        });
-        self.send(&LOCAL_POSITION_NED_DATA {
-            x: 10.0,
-            y: 30.0,
-            z: -60.0,
-            ..LOCAL_POSITION_NED_DATA::DEFAULT
-        });
-        self.send(&BATTERY_STATUS_DATA { battery_remaining: 50, ..BATTERY_STATUS_DATA::DEFAULT });
-    }
-
-    /// Repeats the autopilot's state until `wanted` is answered. Sends garbage in between.
-    fn until<T>(&mut self, mut wanted: impl FnMut(Address, &Message) -> Option<T>) -> T {
-        for round in 0..100u8 {
-            self.send_state();
-            self.socket.send(&[0xFD, round, 0, 0, 1, 2, 3, 0xFE, 0xFF, round]).unwrap();
-            if let Some(answer) = self.drain(&mut wanted) {
-                return answer;
-            }
-        }
-        panic!("it never came");
-    }
-
-    /// Reads until nothing comes for a while.
-    fn drain<T>(&mut self, mut wanted: impl FnMut(Address, &Message) -> Option<T>) -> Option<T> {
-        let mut buffer = [0; 2048];
-        while let Ok(bytes) = self.socket.recv(&mut buffer) {
-            let datagram = &buffer[..bytes];
-            assert_eq!(self.decoder.push(datagram), bytes);
-            let (mut whole, mut answer) = (0, None);
-            while let Some(frame) = self.decoder.next_frame() {
-                whole += frame.payload().len() + 12;
-                let message = Message::decode(&frame).unwrap();
-                answer = answer.or(message.and_then(|message| wanted(frame.sender, &message)));
-            }
-            assert_eq!(whole, bytes, "whole frames in each datagram: {datagram:02x?}");
-            if answer.is_some() {
-                return answer;
-            }
-        }
-        None
-    }
-
-    fn ask_for_shadow(&mut self) {
-        let shadow = COMMAND_LONG_DATA {
-            target_system: GLEANER.system,
-            target_component: GLEANER.component,
-            command: MavCmd::MAV_CMD_USER_2,
-            param1: 2.0,
-            ..COMMAND_LONG_DATA::DEFAULT
-        };
-        // A ground station, by way of the autopilot's port.
-        self.send_as(Address::new(255, 190), &shadow);
-    }
-
-    /// Goes on until a decision record comes.
-    fn await_decision(&mut self) {
-        self.until(|_, message| matches!(message, Message::Heartbeat(_)).then_some(()));
-        self.ask_for_shadow();
-        self.until(|_, message| match message {
-            Message::Tunnel { payload_type: TUNNEL_DECISION, .. } => Some(()),
-            _ => None,
-        });
-    }
-}
+use std::process::{Command, Stdio};
 
 #[test]
-fn it_speaks_as_a_component_of_the_vehicle_and_ends_on_an_interrupt() {
+fn it_is_a_component_of_the_vehicle_until_interrupted() {
     let fixture = Fixture::new();
     let mut running = Running::start(&mut fixture.gleaner("run"));
     let mut autopilot = FakeAutopilot::find(&mut running);
@@ -208,11 +25,12 @@ fn it_speaks_as_a_component_of_the_vehicle_and_ends_on_an_interrupt() {
     assert_eq!(code, Some(0), "{rest}");
     assert!(rest.contains("stopped after 0 decisions: setpoints and heartbeat have ended"), "{rest}");
     assert!(!rest.contains("panicked"), "{rest}");
+    assert!(rest.contains("autopilot port udpin:127.0.0.1:0: "), "the traffic is printed: {rest}");
     let goodbye = autopilot.drain(|_, message| match message {
         Message::StatusText { text, .. } if text.starts_with(b"gleaner: stopped") => Some(()),
         _ => None,
     });
-    assert!(goodbye.is_some(), "the operator was told");
+    assert!(goodbye.is_some(), "a status text said so");
 }
 
 #[test]
@@ -242,13 +60,14 @@ fn every_decision_is_logged_whole() {
 }
 
 #[test]
-fn a_full_disk_is_said_once_and_the_flight_goes_on() {
+fn a_full_disk_is_reported_once_and_the_flight_goes_on() {
     let fixture = Fixture::new();
     std::fs::create_dir(fixture.path("log")).unwrap();
     std::os::unix::fs::symlink("/dev/full", fixture.path("log/decisions.jsonl")).unwrap();
     let mut running = Running::start(&mut fixture.gleaner("run"));
     let mut autopilot = FakeAutopilot::find(&mut running);
     autopilot.await_decision();
+    autopilot.await_text("gleaner: decision log: disk full");
     autopilot.until(|_, message| match message {
         Message::Tunnel { payload_type: TUNNEL_DECISION, .. } => Some(()),
         _ => None,
@@ -256,12 +75,11 @@ fn a_full_disk_is_said_once_and_the_flight_goes_on() {
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");
     assert_eq!(rest.matches("make room on the disk; flying on without the log").count(), 1, "{rest}");
-    assert!(rest.contains("decisions were not written"), "{rest}");
+    assert!(rest.contains("records were not written"), "{rest}");
 }
 
-/// Who reads the messages must not decide over the flight: a log nobody takes any more, and a terminal that is held.
 #[test]
-fn messages_that_nobody_takes_do_not_end_the_flight_nor_hold_it() {
+fn a_blocked_or_closed_console_does_not_stop_the_flight() {
     for is_held in [false, true] {
         let fixture = Fixture::new();
         let (messages, stderr) = std::io::pipe().unwrap();
@@ -271,7 +89,7 @@ fn messages_that_nobody_takes_do_not_end_the_flight_nor_hold_it() {
         let mut line = String::new();
         while !line.contains("local address ") {
             line.clear();
-            assert_ne!(messages.read_line(&mut line).unwrap(), 0, "it ended");
+            assert_ne!(messages.read_line(&mut line).unwrap(), 0, "the process ended");
         }
         let mut autopilot = FakeAutopilot::at(line.trim_end());
         let _held = if is_held {
@@ -323,7 +141,7 @@ fn a_closed_terminal_ends_the_run_unless_hangups_are_ignored() {
 }
 
 #[test]
-fn a_radio_that_disappears_is_said_once_and_taken_back() {
+fn a_lost_radio_is_reported_once_and_opened_again() {
     let fixture = Fixture::new();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let radio = format!("tcpout:{}", listener.local_addr().unwrap());
@@ -331,15 +149,9 @@ fn a_radio_that_disappears_is_said_once_and_taken_back() {
     let mut autopilot = FakeAutopilot::find(&mut running);
     autopilot.until(|_, message| matches!(message, Message::Heartbeat(_)).then_some(()));
     drop(listener.accept().unwrap());
-    let mut told = |text: &[u8]| {
-        autopilot.until(|_, message| match message {
-            Message::StatusText { text: line, .. } if line.starts_with(text) => Some(()),
-            _ => None,
-        });
-    };
-    told(b"gleaner: radio port down, retrying");
+    autopilot.await_text("gleaner: radio port down, retrying");
     let again = listener.accept().unwrap();
-    told(b"gleaner: radio port is back");
+    autopilot.await_text("gleaner: radio port is back");
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");
     assert_eq!(rest.matches(&format!("radio port {radio} is down: ")).count(), 1, "{rest}");
@@ -367,8 +179,7 @@ fn check_hears_the_autopilot() {
         if line.starts_with("ok    autopilot") {
             let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
             socket.connect(own).unwrap();
-            let decoder = FrameDecoder::new();
-            FakeAutopilot { socket, decoder, sequence: 0 }.send_state();
+            FakeAutopilot::over(socket).send_state();
         }
         if line.contains("heartbeat") {
             heard = Some(line);

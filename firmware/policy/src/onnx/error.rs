@@ -19,10 +19,12 @@ pub enum ModelError {
         found: String,
     },
     /// A metadata entry is not there.
-    #[error("the model has no metadata entry `{0}`: write it with `gleaner-train export`")]
+    #[error(
+        "the model has no metadata entry `{0}`: export it with `gleaner-train export`, or seal it with `gleaner seal`"
+    )]
     MissingMetadata(&'static str),
     /// A metadata entry cannot be read.
-    #[error("metadata entry `{key}` of the model: {cause}: write it again with `gleaner-train export`")]
+    #[error("metadata entry `{key}` of the model: {cause}: seal the model again with `gleaner seal`")]
     BadMetadata {
         /// Which entry.
         key: &'static str,
@@ -63,10 +65,10 @@ pub enum ModelError {
         program: String,
     },
     /// The graph's inputs or outputs are not the contract's.
-    #[error("{0}: write the model with `gleaner-train export`")]
+    #[error("{0}: correct the export")]
     Interface(String),
     /// The engine cannot run the graph.
-    #[error("tract cannot run the model ({0}): write it with `gleaner-train export`")]
+    #[error("tract cannot run the model ({0}): correct the export")]
     Engine(String),
     /// The file of the native engine is not fit for it.
     #[error("{0}")]

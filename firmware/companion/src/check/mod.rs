@@ -1,0 +1,163 @@
+//! `gleaner check`: everything that can be known before take-off, as a table of findings.
+
+mod listen;
+mod mission;
+
+use crate::args::Setup;
+use crate::config::{self, Config};
+use crate::error::StartError;
+use crate::load;
+use crate::logs::DecisionLog;
+use crate::run::open;
+use gleaner_policy::{Engine, Policy};
+use gleaner_ports::Peers;
+use std::process::ExitCode;
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+
+/// Inferences that are timed; the median is printed.
+const TIMED_INFERENCES: usize = 201;
+
+/// Checks everything and prints one finding a line. 0 when nothing is at fault and the autopilot was heard, or not
+/// listened for; 1 otherwise.
+///
+/// # Errors
+/// The configuration cannot be read: there is nothing to check.
+pub fn check(setup: &Setup, wait_s: u64) -> Result<ExitCode, StartError> {
+    let config = config::resolve(setup)?;
+    let mut findings = Findings::default();
+    let file = setup.config.as_ref().map_or("flags only".into(), |path| path.display().to_string());
+    findings.good("config", file);
+    if let Some(found) = findings.of("mission", load::mission(&config.mission), mission::describe) {
+        mission::check(&mut findings, &found, &config.parameters);
+    }
+    check_model(&mut findings, &config);
+    let heard = check_ports(&mut findings, &config, wait_s);
+    if let Some(folder) = &config.log_dir {
+        let (news, _) = channel();
+        let opened = DecisionLog::open(folder, 0, config.log_limits, news).map(DecisionLog::close);
+        findings.of("log", opened, |()| folder.display().to_string());
+    }
+    Ok(findings.verdict(heard))
+}
+
+/// Whether the autopilot was heard.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Heard {
+    Yes,
+    No,
+    NotListened,
+}
+
+/// The table, printed as it grows.
+#[derive(Default)]
+struct Findings {
+    failed: usize,
+    warned: usize,
+}
+
+impl Findings {
+    fn good(&mut self, what: &str, detail: impl AsRef<str>) {
+        println!("ok    {what:<10} {}", detail.as_ref());
+    }
+
+    fn warn(&mut self, what: &str, detail: impl AsRef<str>) {
+        self.warned += 1;
+        println!("warn  {what:<10} {}", detail.as_ref());
+    }
+
+    fn bad(&mut self, what: &str, detail: impl AsRef<str>) {
+        self.failed += 1;
+        println!("FAIL  {what:<10} {}", detail.as_ref());
+    }
+
+    /// Prints the outcome and returns the value, if there is one.
+    fn of<T>(
+        &mut self,
+        what: &str,
+        outcome: Result<T, StartError>,
+        describe: impl FnOnce(&T) -> String,
+    ) -> Option<T> {
+        match &outcome {
+            Ok(value) => self.good(what, describe(value)),
+            Err(error) => self.bad(what, error.to_string()),
+        }
+        outcome.ok()
+    }
+
+    fn verdict(&self, heard: Heard) -> ExitCode {
+        let count = |count: usize, what: &str| match count {
+            1 => format!("1 {what}"),
+            _ => format!("{count} {what}s"),
+        };
+        let warnings =
+            if self.warned > 0 { format!(", {}", count(self.warned, "warning")) } else { String::new() };
+        if self.failed > 0 {
+            println!("not ready: {}{warnings}", count(self.failed, "fault"));
+            return ExitCode::FAILURE;
+        }
+        match heard {
+            Heard::Yes => println!("ready{warnings}"),
+            Heard::No => println!("ready, but no autopilot was heard{warnings}"),
+            Heard::NotListened => println!("ready, autopilot not listened for{warnings}"),
+        }
+        if heard == Heard::No { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+    }
+}
+
+fn check_model(findings: &mut Findings, config: &Config) {
+    let path = config.model.as_deref();
+    let model = findings.of("model", load::model(path, config.engine), |model| {
+        let trained = model
+            .card()
+            .map_or_else(String::new, |card| format!(", {} steps in {}", card.steps, card.scenario));
+        let identity: String = model.sha256().chars().take(12).collect();
+        let file = load::model_name(path);
+        format!("{} {}{trained}, sha256 {identity} ({})", model.name(), model.version(), file.display())
+    });
+    if let Some(model) = model {
+        check_engine(findings, model);
+    }
+}
+
+/// The model was verified when it was loaded; here its speed is measured.
+fn check_engine(findings: &mut Findings, mut model: Engine) {
+    findings.good("engine", model.to_string());
+    let goldens = model.goldens().to_vec();
+    findings.good("self-test", format!("{} golden pairs reproduced", goldens.len()));
+    let mut took = Vec::with_capacity(TIMED_INFERENCES);
+    for golden in goldens.iter().cycle().take(TIMED_INFERENCES) {
+        let start = Instant::now();
+        if let Err(error) = model.infer(&golden.tokens) {
+            return findings.bad("inference", format!("{error}: export the model again"));
+        }
+        took.push(start.elapsed());
+    }
+    took.sort_unstable();
+    if let (Some(median), Some(longest)) = (took.get(took.len() / 2), took.last()) {
+        findings.good("inference", format!("{} us, longest {} us", median.as_micros(), longest.as_micros()));
+    }
+}
+
+fn check_ports(findings: &mut Findings, config: &Config, wait_s: u64) -> Heard {
+    if let Some(endpoint) = &config.radio {
+        findings.of("radio", open("radio", endpoint, Peers::All), |port| port.endpoint().to_string());
+    }
+    for endpoint in &config.ground {
+        findings.of("ground", open("ground", endpoint, Peers::Bound), |port| port.endpoint().to_string());
+    }
+    let autopilot = open("autopilot", &config.autopilot, Peers::Bound);
+    let link = findings.of("autopilot", autopilot, |port| port.endpoint().to_string());
+    let Some(mut link) = link.filter(|_| wait_s > 0) else { return Heard::NotListened };
+    let heard = listen::autopilot(&mut link, Duration::from_secs(wait_s));
+    match heard {
+        Ok(heard) => {
+            findings.good("heartbeat", heard);
+            Heard::Yes
+        }
+        Err(silence) => {
+            findings.warn("heartbeat", format!("{silence} in {wait_s} s"));
+            Heard::No
+        }
+    }
+}

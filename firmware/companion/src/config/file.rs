@@ -1,0 +1,177 @@
+//! The configuration file and its faults.
+
+use super::{ConfigError, SigningConfig};
+use crate::logs::Limits;
+use gleaner_link::{Operators, Parameters};
+use gleaner_pilot::Settings;
+use gleaner_policy::EngineKind;
+use gleaner_ports::Endpoint;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// The file as it is written.
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct File {
+    pub model: Option<PathBuf>,
+    pub engine: Option<Spanned<String>>,
+    pub mission: Option<PathBuf>,
+    pub autopilot: Option<Spanned<String>>,
+    #[serde(default)]
+    pub ground: Vec<Spanned<String>>,
+    pub radio: Option<Spanned<String>>,
+    pub log_dir: Option<PathBuf>,
+    pub state_dir: Option<PathBuf>,
+    component_id: Option<Spanned<i64>>,
+    system_id: Option<Spanned<i64>>,
+    operators: Option<Vec<Spanned<String>>>,
+    signing: Option<SigningTable>,
+    #[serde(default)]
+    pub log: LogTable,
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Spanned<f64>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct LogTable {
+    pub telemetry: bool,
+    file_mb: Option<Spanned<i64>>,
+    min_free_mb: Option<Spanned<i64>>,
+}
+
+impl Default for LogTable {
+    fn default() -> LogTable {
+        LogTable { telemetry: true, file_mb: None, min_free_mb: None }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SigningTable {
+    key: PathBuf,
+    ports: Option<Vec<Spanned<String>>>,
+}
+
+/// The file that values come from, for the place of a fault and for relative paths.
+pub(super) struct Source<'s> {
+    pub path: &'s Path,
+    pub text: &'s str,
+}
+
+impl Source<'_> {
+    pub fn parse(&self) -> Result<File, ConfigError> {
+        toml::from_str(self.text).map_err(|error| {
+            let offset = error.span().map_or(0, |span| span.start);
+            self.fault(offset, error.message().replace('\n', " "))
+        })
+    }
+
+    fn fault(&self, offset: usize, what: String) -> ConfigError {
+        let line = 1 + self.text.bytes().take(offset).filter(|&byte| byte == b'\n').count();
+        ConfigError::Line { path: self.path.to_owned(), line, what }
+    }
+
+    pub fn endpoint(&self, key: &str, text: &Spanned<String>) -> Result<Endpoint, ConfigError> {
+        text.get_ref().parse().map_err(|error| self.fault(text.span().start, format!("{key}: {error}")))
+    }
+
+    pub fn engine(&self, name: &Spanned<String>) -> Result<EngineKind, ConfigError> {
+        name.get_ref()
+            .parse()
+            .map_err(|error| self.fault(name.span().start, format!("engine = {:?}: {error}", name.get_ref())))
+    }
+
+    /// MAVLink guide, "Routing": 0 addresses every system; 255 is the id of ground stations, and component 1 that of the
+    /// autopilot.
+    pub fn settings(&self, file: &File) -> Result<Settings, ConfigError> {
+        let mut settings = Settings::default();
+        if let Some(component_id) = &file.component_id {
+            settings.component_id =
+                self.number("component_id", component_id, 2..=254, "191 to 194 are usual")?;
+        }
+        if let Some(system_id) = &file.system_id {
+            let id =
+                self.number("system_id", system_id, 1..=254, "or leave it out to adopt the autopilot's")?;
+            settings.system_id = Some(id);
+        }
+        if let Some(operators) = &file.operators {
+            settings.operators = self.operators(operators)?;
+        }
+        Ok(settings)
+    }
+
+    fn operators(&self, texts: &[Spanned<String>]) -> Result<Operators, ConfigError> {
+        let mut operators = Operators::none();
+        for text in texts {
+            let at = |what: String| self.fault(text.span().start, format!("operators: {what}"));
+            let operator =
+                text.get_ref().parse().map_err(|error| at(format!("{:?}: {error}", text.get_ref())))?;
+            if !operators.add(operator) {
+                return Err(at(format!("more than {} entries", Operators::MAX)));
+            }
+        }
+        Ok(operators)
+    }
+
+    pub fn signing(&self, file: &File, folder: &Path) -> Result<Option<SigningConfig>, ConfigError> {
+        let Some(table) = &file.signing else { return Ok(None) };
+        let mut ports = Vec::new();
+        for port in table.ports.iter().flatten() {
+            if !["autopilot", "ground"].contains(&port.get_ref().as_str()) {
+                let what = format!("signing.ports: {:?}: a port is autopilot or ground", port.get_ref());
+                return Err(self.fault(port.span().start, what));
+            }
+            ports.push(port.get_ref().clone());
+        }
+        if table.ports.is_none() {
+            ports.push("ground".to_owned());
+        }
+        Ok(Some(SigningConfig { key: folder.join(&table.key), ports }))
+    }
+
+    pub fn limits(&self, table: &LogTable) -> Result<Limits, ConfigError> {
+        let bytes = |key, value: &Option<Spanned<i64>>, default: u32, most: u32| {
+            let megabytes = match value {
+                Some(value) => self.number(key, value, 1..=most, "in megabytes")?,
+                None => default,
+            };
+            Ok(u64::from(megabytes) << 20)
+        };
+        Ok(Limits {
+            file_bytes: bytes("file_mb", &table.file_mb, 64, 4_096)?,
+            min_free_bytes: bytes("min_free_mb", &table.min_free_mb, 256, 1 << 20)?,
+        })
+    }
+
+    fn number<N: TryFrom<i64> + PartialOrd + std::fmt::Display>(
+        &self,
+        key: &str,
+        value: &Spanned<i64>,
+        allowed: std::ops::RangeInclusive<N>,
+        advice: &str,
+    ) -> Result<N, ConfigError> {
+        N::try_from(*value.get_ref()).ok().filter(|number| allowed.contains(number)).ok_or_else(|| {
+            let (low, high) = (allowed.start(), allowed.end());
+            let what =
+                format!("{key} = {}: it must be a number from {low} to {high}, {advice}", value.get_ref());
+            self.fault(value.span().start, what)
+        })
+    }
+
+    pub fn parameters(&self, values: &BTreeMap<String, Spanned<f64>>) -> Result<Parameters, ConfigError> {
+        let mut parameters = Parameters::default();
+        for (name, value) in values {
+            let at = |what| self.fault(value.span().start, format!("{name} = {}: {what}", value.get_ref()));
+            if name == "GLN_ENABLE" {
+                return Err(at("only a request in flight may engage: remove this line".into()));
+            }
+            if let Err(error) = parameters.set(name, *value.get_ref() as f32) {
+                return Err(at(format!("{error}: correct or remove this line")));
+            }
+        }
+        Ok(parameters)
+    }
+}

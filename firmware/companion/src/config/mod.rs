@@ -1,0 +1,186 @@
+//! The configuration: the values of the file, overridden by flags, all checked.
+//!
+//! ```toml
+//! model = "policy.onnx"                       # optional; paths are relative to this file
+//! engine = "tract"                            # optional: tract or native
+//! mission = "mission.toml"
+//! autopilot = "serial:/dev/ttyAMA0:921600"
+//! ground = ["udpout:192.168.1.10:14550"]      # optional: more MAVLink ports
+//! radio = "serial:/dev/ttyUSB0:115200"        # optional: reports may also arrive by TUNNEL
+//! log_dir = "log"                             # optional
+//! state_dir = "state"                         # optional
+//! component_id = 191                          # optional
+//! system_id = 1                               # optional: needed where several autopilots are on the link
+//! operators = ["255", "*/190"]                # optional: system/component ids that may command
+//!
+//! [signing]                                   # optional
+//! key = "signing.key"                         # 64 hexadecimal digits or a passphrase, mode 600
+//! ports = ["ground"]                          # or "autopilot"
+//!
+//! [log]                                       # optional
+//! telemetry = true                            # flight.tlog beside decisions.jsonl
+//! file_mb = 64                                # a longer file is renamed; eight old ones are kept
+//! min_free_mb = 256                           # space left on the disk
+//!
+//! [parameters]                                # optional: initial values, as PARAM_SET would set them
+//! GLN_W_DATA = 0.5
+//! ```
+
+mod file;
+
+use crate::args::Setup;
+use crate::logs::Limits;
+use crate::text::{self, TextFault};
+use file::Source;
+use gleaner_link::Parameters;
+use gleaner_pilot::Settings;
+use gleaner_policy::EngineKind;
+use gleaner_ports::Endpoint;
+use std::path::{Path, PathBuf};
+use std::{env, fs, io};
+
+/// Everything that a run needs.
+pub struct Config {
+    /// The model file; without one the built-in model.
+    pub model: Option<PathBuf>,
+    /// What runs the model.
+    pub engine: EngineKind,
+    /// The mission file.
+    pub mission: PathBuf,
+    /// Port to the autopilot.
+    pub autopilot: Endpoint,
+    /// Ports to ground stations.
+    pub ground: Vec<Endpoint>,
+    /// Port to the radio.
+    pub radio: Option<Endpoint>,
+    /// Folder of the logs.
+    pub log_dir: Option<PathBuf>,
+    /// Folder of what outlives a run.
+    pub state_dir: Option<PathBuf>,
+    /// Whether `flight.tlog` is written.
+    pub telemetry_log: bool,
+    /// How much of the disk the logs may take.
+    pub log_limits: Limits,
+    /// Our ids on the link.
+    pub settings: Settings,
+    /// Initial values.
+    pub parameters: Parameters,
+    /// Message signing, where a port needs it.
+    pub signing: Option<SigningConfig>,
+}
+
+/// Message signing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SigningConfig {
+    /// The key file.
+    pub key: PathBuf,
+    /// Roles of the ports that sign: `autopilot`, `ground`.
+    pub ports: Vec<String>,
+}
+
+/// What is wrong with the configuration.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("config {}: cannot be read: {source}: correct the path after --config", .path.display())]
+    Read {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The file is not text.
+    #[error("config {}: {source}", .path.display())]
+    Text {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: TextFault,
+    },
+    /// A line of the file is wrong.
+    #[error("config {}: line {line}: {what}", .path.display())]
+    Line {
+        /// Where.
+        path: PathBuf,
+        /// Counted from 1.
+        line: usize,
+        /// Which key, what is wrong, what to do.
+        what: String,
+    },
+    /// Neither the file nor a flag sets a value that is needed.
+    #[error(
+        "no {key} is set: give --{key}, or write `{key} = \"{example}\"` into the file given with --config"
+    )]
+    Missing {
+        /// The key, which is also the flag.
+        key: &'static str,
+        /// A good value.
+        example: &'static str,
+    },
+}
+
+/// The values to use: flags first, then the file, then the folders that systemd gives to a service.
+///
+/// # Errors
+/// The first fault, see [`ConfigError`].
+pub fn resolve(setup: &Setup) -> Result<Config, ConfigError> {
+    let text = setup.config.as_deref().map(read).transpose()?.unwrap_or_default();
+    let path = setup.config.as_deref().unwrap_or(Path::new(""));
+    merge(setup, &Source { path, text: &text }, |name| env::var_os(name).map(PathBuf::from))
+}
+
+/// The parameters that the file at `path` sets, the others at their defaults. Nothing else of the file is checked.
+///
+/// # Errors
+/// The file cannot be read, is no configuration, or holds a parameter out of its range.
+pub fn parameters(path: &Path) -> Result<Parameters, ConfigError> {
+    let text = read(path)?;
+    let source = Source { path, text: &text };
+    source.parameters(&source.parse()?.parameters)
+}
+
+fn read(path: &Path) -> Result<String, ConfigError> {
+    let bytes = fs::read(path).map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+    text::decode(bytes).map_err(|source| ConfigError::Text { path: path.to_owned(), source })
+}
+
+fn merge(
+    setup: &Setup,
+    source: &Source<'_>,
+    variable: impl Fn(&str) -> Option<PathBuf>,
+) -> Result<Config, ConfigError> {
+    let file = source.parse()?;
+    let folder = source.path.parent().unwrap_or(Path::new(""));
+    let path = |flag: &Option<PathBuf>, key: &Option<PathBuf>| {
+        flag.clone().or_else(|| key.as_ref().map(|path| folder.join(path)))
+    };
+    let missing = |key, example| ConfigError::Missing { key, example };
+    // All of the file is checked, including what a flag overrides: a fault must not appear on another day.
+    let autopilot = file.autopilot.as_ref().map(|text| source.endpoint("autopilot", text)).transpose()?;
+    let ground: Vec<Endpoint> =
+        file.ground.iter().map(|text| source.endpoint("ground", text)).collect::<Result<_, _>>()?;
+    let engine = file.engine.as_ref().map(|name| source.engine(name)).transpose()?;
+    let radio = file.radio.as_ref().map(|text| source.endpoint("radio", text)).transpose()?;
+    Ok(Config {
+        settings: source.settings(&file)?,
+        parameters: source.parameters(&file.parameters)?,
+        log_limits: source.limits(&file.log)?,
+        telemetry_log: file.log.telemetry,
+        signing: source.signing(&file, folder)?,
+        model: path(&setup.model, &file.model),
+        engine: setup.engine.or(engine).unwrap_or_default(),
+        mission: path(&setup.mission, &file.mission).ok_or(missing("mission", "mission.toml"))?,
+        autopilot: setup
+            .autopilot
+            .clone()
+            .or(autopilot)
+            .ok_or(missing("autopilot", "serial:/dev/ttyAMA0:921600"))?,
+        ground: if setup.ground.is_empty() { ground } else { setup.ground.clone() },
+        radio: setup.radio.clone().or(radio),
+        log_dir: path(&setup.log_dir, &file.log_dir).or_else(|| variable("LOGS_DIRECTORY")),
+        state_dir: path(&setup.state_dir, &file.state_dir).or_else(|| variable("STATE_DIRECTORY")),
+    })
+}
+
+#[cfg(test)]
+mod tests;

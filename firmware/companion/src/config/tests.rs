@@ -1,0 +1,141 @@
+use super::*;
+
+const TEXT: &str = r#"model = "policy.onnx"
+mission = "missions/city.toml"
+autopilot = "udpin:127.0.0.1:14540"
+radio = "serial:/dev/ttyUSB0:115200"
+log_dir = "/var/log/gleaner"
+component_id = 192
+system_id = 7
+
+[parameters]
+GLN_W_DATA = 1
+GLN_ALT = 75.5
+"#;
+
+fn merged(setup: &Setup, text: &str) -> Result<Config, String> {
+    merge(setup, &Source { path: Path::new("/etc/gleaner/gleaner.toml"), text }, |_| None)
+        .map_err(|error| error.to_string())
+}
+
+fn fault(text: &str) -> String {
+    let error = merged(&Setup::default(), text).err().unwrap();
+    assert_eq!(error.lines().count(), 1, "{error}");
+    error
+}
+
+#[test]
+fn paths_are_relative_to_the_file_and_flags_go_first() {
+    let config = merged(&Setup::default(), TEXT).unwrap();
+    assert_eq!(config.model.as_deref(), Some(Path::new("/etc/gleaner/policy.onnx")));
+    assert_eq!(config.engine, EngineKind::Tract);
+    assert_eq!(config.mission, Path::new("/etc/gleaner/missions/city.toml"));
+    assert_eq!(config.log_dir.as_deref(), Some(Path::new("/var/log/gleaner")));
+    assert_eq!(config.settings, Settings { system_id: Some(7), component_id: 192, ..Settings::default() });
+    assert_eq!(config.parameters.altitude().0, 75.5);
+    let setup = Setup {
+        model: Some("other.onnx".into()),
+        engine: Some(EngineKind::Native),
+        autopilot: Some("tcpout:127.0.0.1:5760".parse().unwrap()),
+        ..Setup::default()
+    };
+    let config = merged(&setup, TEXT).unwrap();
+    assert_eq!(config.model.as_deref(), Some(Path::new("other.onnx")));
+    assert_eq!(config.engine, EngineKind::Native);
+    assert_eq!(config.autopilot.to_string(), "tcpout:127.0.0.1:5760");
+    assert_eq!(config.radio.unwrap().to_string(), "serial:/dev/ttyUSB0:115200");
+}
+
+#[test]
+fn faults_name_file_line_and_key_and_say_what_to_do() {
+    let file = "config /etc/gleaner/gleaner.toml: ";
+    let cases = [
+        (
+            "component_id = 192",
+            "component_id = 1",
+            "line 6: component_id = 1: it must be a number from 2 to 254, 191 to 194 are usual",
+        ),
+        (
+            "system_id = 7",
+            "system_id = 256",
+            "line 7: system_id = 256: it must be a number from 1 to 254, or leave it out to adopt the autopilot's",
+        ),
+        (
+            "GLN_W_DATA = 1",
+            "GLN_ENABLE = 1",
+            "line 10: GLN_ENABLE = 1: only a request in flight may engage: remove this line",
+        ),
+        (
+            "GLN_W_DATA = 1",
+            "GLN_DATA = 1",
+            "line 10: GLN_DATA = 1: no such parameter: correct or remove this line",
+        ),
+    ];
+    for (from, to, expected) in cases {
+        assert_eq!(fault(&TEXT.replace(from, to)), format!("{file}{expected}"));
+    }
+    for (from, to, start) in [
+        ("model =", "modle =", "line 1: unknown field `modle`, expected one of `model`, `engine`, `mission`"),
+        ("udpin:127.0.0.1:14540", "udpin:14540", "line 3: autopilot: 'udpin:14540' is not an endpoint: "),
+        (
+            "component_id",
+            "engine = \"onnx\"\ncomponent_id",
+            "line 6: engine = \"onnx\": an engine is tract or native",
+        ),
+        ("GLN_W_DATA = 1", "GLN_W_DATA = nan", "line 10: GLN_W_DATA = NaN: "),
+        ("GLN_W_DATA = 1", "GLN_W_DATA = -1", "line 10: GLN_W_DATA = -1: "),
+        ("GLN_ALT = 75.5", "GLN_ALT = 1e300", "line 11: GLN_ALT = 1"),
+        ("system_id = 7", "system_id = \"7\"", "line 7: invalid type: string \"7\""),
+        ("[parameters]", "[parameters", "line 9: "),
+    ] {
+        let error = fault(&TEXT.replace(from, to));
+        assert!(error.starts_with(&format!("{file}{start}")), "{error}");
+    }
+    assert_eq!(
+        fault(""),
+        "no mission is set: give --mission, or write `mission = \"mission.toml\"` into the file given with --config"
+    );
+}
+
+#[test]
+fn systemd_gives_the_folders_that_are_not_set() {
+    let text = "mission = \"m\"\nautopilot = \"udpin:0.0.0.0:1\"\nlog_dir = \"own\"";
+    let source = Source { path: Path::new("/etc/gleaner.toml"), text };
+    let config = merge(&Setup::default(), &source, |name| Some(Path::new("/var").join(name))).unwrap();
+    assert_eq!(config.log_dir.as_deref(), Some(Path::new("/etc/own")));
+    assert_eq!(config.state_dir.as_deref(), Some(Path::new("/var/STATE_DIRECTORY")));
+    assert_eq!((config.model, config.ground.len()), (None, 0));
+}
+
+#[test]
+fn several_ground_ports_and_log_limits_are_read() {
+    let more = "ground = [\"udpout:10.0.0.2:14550\", \"tcpin:0.0.0.0:5760\"]\n";
+    let log = "\n[log]\nfile_mb = 8\ntelemetry = false\n";
+    let config = merged(&Setup::default(), &format!("{more}{TEXT}{log}")).unwrap();
+    assert_eq!(config.ground.len(), 2);
+    assert!(!config.telemetry_log);
+    let limits = Limits { file_bytes: 8 << 20, min_free_bytes: 256 << 20 };
+    assert_eq!(config.log_limits, limits);
+    let error = fault(&format!("{TEXT}\n[log]\nfile_mb = 0\n"));
+    assert!(
+        error.ends_with("line 14: file_mb = 0: it must be a number from 1 to 4096, in megabytes"),
+        "{error}"
+    );
+}
+
+#[test]
+fn operators_and_signing_are_read() {
+    let more = "operators = [\"250\", \"*/195\"]\n";
+    let signing = "\n[signing]\nkey = \"signing.key\"\n";
+    let config = merged(&Setup::default(), &format!("{more}{TEXT}{signing}")).unwrap();
+    assert_ne!(config.settings.operators, Settings::default().operators);
+    let signing = config.signing.unwrap();
+    assert_eq!(
+        (signing.key.as_path(), &signing.ports[..]),
+        (Path::new("/etc/gleaner/signing.key"), &["ground".to_owned()][..])
+    );
+    let error = fault(&format!("operators = [\"0\"]\n{TEXT}"));
+    assert!(error.contains("line 1: operators: \"0\": an operator is SYSTEM"), "{error}");
+    let error = fault(&format!("{TEXT}\n[signing]\nkey = \"k\"\nports = [\"radio\"]\n"));
+    assert!(error.ends_with("line 15: signing.ports: \"radio\": a port is autopilot or ground"), "{error}");
+}

@@ -1,0 +1,282 @@
+//! The decision loop.
+//!
+//! Bytes are read as they arrive. Every 20 ms the pilot is polled and its messages are sent. Setpoints and heartbeat
+//! leave only after a poll: when this loop stops, both stop, and the autopilot's own failsafes act.
+
+use super::console::Console;
+use super::service::Service;
+use super::{Kept, Logs, unix_time_s};
+use crate::clock;
+use crate::logs::LogNews;
+use crate::routing::Links;
+use gleaner_link::{MAX_FRAME_BYTES, Severity};
+use gleaner_pilot::{Onboard, POLL_INTERVAL, State};
+use gleaner_policy::{Engine, Timed};
+use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
+use std::time::{Duration, Instant};
+
+/// Time between polls of the pilot.
+const TICK: Duration = Duration::from_micros(POLL_INTERVAL.as_micros());
+/// Reads per port and turn: a flood on one port must not delay the poll.
+const READS_PER_TURN: usize = 32;
+/// After a longer pause messages wait in the system's queues. All of them are read before the pilot is polled, so that it
+/// does not act on the oldest as if it were new.
+const LATE: Duration = Duration::from_millis(300);
+/// Turns of reading after a pause: 8,192 datagrams a port, more than the system keeps.
+const DRAIN_TURNS: usize = 256;
+/// Time for the last messages: status texts leave at ten a second.
+const GOODBYE: Duration = Duration::from_millis(300);
+/// Time between two reports of the traffic.
+const TRAFFIC_PERIOD: Duration = Duration::from_secs(10);
+
+/// The pilot with everything around it.
+pub struct Flight {
+    onboard: Onboard<Timed<Engine>>,
+    links: Links,
+    radio: Option<Port>,
+    logs: Logs,
+    kept: Option<Kept>,
+    console: Console,
+    service: Service,
+    polled_at: Instant,
+    traffic_at: Instant,
+    revocations: u32,
+}
+
+impl Flight {
+    /// A pilot that has not been polled yet.
+    pub fn new(
+        onboard: Onboard<Timed<Engine>>,
+        links: Links,
+        radio: Option<Port>,
+        logs: Logs,
+        kept: Option<Kept>,
+        console: Console,
+        service: Service,
+    ) -> Flight {
+        let now = Instant::now();
+        let mut flight = Flight {
+            revocations: onboard.link().revocations(),
+            onboard,
+            links,
+            radio,
+            logs,
+            kept,
+            console,
+            service,
+            polled_at: now,
+            traffic_at: now,
+        };
+        flight.confess();
+        flight.service.ready();
+        flight
+    }
+
+    /// Reports a last run that did not end as asked.
+    fn confess(&mut self) {
+        let Some(last) = self.kept.as_mut().and_then(|kept| kept.last_run.take()) else { return };
+        if let Some(panic) = last.panic() {
+            tracing::error!("the last run ended with {panic}");
+        }
+        self.onboard.say(last.severity(), format_args!("gleaner: {last}"));
+    }
+
+    /// Flies until `is_over`.
+    pub fn fly(&mut self, is_over: impl Fn() -> bool) {
+        let mut next_tick = Instant::now();
+        while !is_over() {
+            self.receive();
+            let now = Instant::now();
+            if now >= next_tick {
+                self.tick(now);
+                next_tick = (next_tick + TICK).max(now);
+            }
+            self.send();
+            self.rest(next_tick.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    fn receive(&mut self) {
+        let late = self.polled_at.elapsed() > LATE;
+        for _ in 0..if late { DRAIN_TURNS } else { 1 } {
+            if !self.receive_turn() {
+                break;
+            }
+        }
+    }
+
+    /// Reads each port; whether bytes may be left.
+    fn receive_turn(&mut self) -> bool {
+        let Flight { onboard, links, logs, console, radio, .. } = self;
+        let mut more = links.receive(Instant::now(), READS_PER_TURN, |_, packet| {
+            onboard.receive_link(clock::now(), &packet.bytes);
+            console.received(packet, onboard.link());
+            if let Some(log) = &mut logs.telemetry {
+                log.write(&packet.bytes);
+            }
+        });
+        let Some(radio) = radio else { return more };
+        let mut buffer = [0; RECEIVE_BYTES];
+        for read in 1..=READS_PER_TURN {
+            let bytes = radio.receive(&mut buffer);
+            if bytes == 0 {
+                break;
+            }
+            more |= read == READS_PER_TURN;
+            onboard.receive_radio(clock::now(), &buffer[..bytes]);
+        }
+        more
+    }
+
+    fn tick(&mut self, now: Instant) {
+        self.maintain(now);
+        self.report_logs();
+        self.onboard.poll(clock::at(now));
+        self.polled_at = now;
+        self.service.feed(now);
+        self.revoke();
+        let took = self.onboard.policy().take();
+        if let Some(took) = took {
+            self.onboard.set_inference_time(took);
+        }
+        let position = self.onboard.link().autopilot().position(clock::at(now), MAX_POSITION_AGE);
+        if let Some(decision) = self.onboard.decision() {
+            self.console.decision(decision);
+            if let Some(log) = &mut self.logs.decisions {
+                log.write(decision, took, position.map(|report| report.position));
+            }
+        }
+        if self.console.state(self.onboard.state()) {
+            self.service.status(self.onboard.state().name());
+        }
+        self.keep(now);
+    }
+
+    /// After a take-over nothing of ours that moves the aircraft may leave, not even from the queues of the ports.
+    fn revoke(&mut self) {
+        let revocations = self.onboard.link().revocations();
+        if std::mem::replace(&mut self.revocations, revocations) != revocations {
+            let dropped = self.links.revoke();
+            tracing::debug!("revoked: {dropped} queued frames dropped");
+        }
+    }
+
+    fn keep(&mut self, now: Instant) {
+        let Some(kept) = &mut self.kept else { return };
+        let state = self.onboard.state();
+        let faults =
+            [kept.parameters.poll(now, self.onboard.parameters()), kept.this_run.note(state, unix_time_s())];
+        for fault in faults.into_iter().flatten() {
+            tracing::warn!("state folder: {fault}: parameters set from the ground may be lost");
+            self.onboard.say(Severity::Warning, format_args!("gleaner: cannot save parameters"));
+        }
+    }
+
+    /// Reports once what went down or came back. A lost port opens again by itself.
+    fn maintain(&mut self, now: Instant) {
+        let Flight { onboard, links, radio, .. } = self;
+        let mut report = |role: &'static str, port: &Port, state: PortState| match state {
+            PortState::Up => {
+                tracing::info!("{role} port {} is back", port.endpoint());
+                onboard.say(Severity::Notice, format_args!("gleaner: {role} port is back"));
+            }
+            // A text about the autopilot's own port reaches the operator when the port is back.
+            PortState::Down(reason) => {
+                tracing::warn!("{role} port {} is down: {reason}: trying to open it again", port.endpoint());
+                onboard.say(Severity::Warning, format_args!("gleaner: {role} port down, retrying"));
+            }
+        };
+        links.maintain(now, &mut report);
+        if let Some(radio) = radio
+            && let Some(state) = radio.maintain(now)
+        {
+            report("radio", radio, state);
+        }
+        if now.saturating_duration_since(self.traffic_at) >= TRAFFIC_PERIOD {
+            self.traffic_at = now;
+            for line in self.links.summary() {
+                tracing::debug!("{line}");
+            }
+        }
+    }
+
+    /// The flight goes on without a log; the operator is told.
+    fn report_logs(&mut self) {
+        while let Ok(news) = self.logs.news.try_recv() {
+            match news {
+                LogNews::Failing(name, cause) => {
+                    tracing::error!("{name}: {cause}: make room on the disk; flying on without the log");
+                    self.onboard.say(Severity::Warning, format_args!("gleaner: {name}: disk full"));
+                }
+                LogNews::Slow(name) => {
+                    tracing::error!("{name}: the disk is too slow; records are lost, flying on");
+                    self.onboard.say(Severity::Warning, format_args!("gleaner: {name}: disk too slow"));
+                }
+                LogNews::Writing(name, lost) => {
+                    tracing::warn!("{name}: writing again after {lost} lost records");
+                    self.onboard.say(Severity::Notice, format_args!("gleaner: {name}: writing again"));
+                }
+            }
+        }
+    }
+
+    fn send(&mut self) {
+        let Flight { onboard, links, logs, console, .. } = self;
+        let now = Instant::now();
+        let mut frame = [0; MAX_FRAME_BYTES];
+        loop {
+            let bytes = onboard.transmit(&mut frame);
+            if bytes == 0 {
+                return;
+            }
+            links.send(now, &frame[..bytes], |packet| {
+                console.sent(packet);
+                if let Some(log) = &mut logs.telemetry {
+                    log.write(&packet.bytes);
+                }
+            });
+        }
+    }
+
+    fn rest(&self, at_most: Duration) {
+        let ports: Vec<&Port> = self.links.ports().map(|(_, port)| port).chain(self.radio.as_ref()).collect();
+        if wait(&ports, at_most).is_err() {
+            // Without the system's help the ports are read once a tick.
+            std::thread::sleep(at_most);
+        }
+    }
+
+    /// Gives the aircraft back and says goodbye. Nothing is sent after that: the autopilot and the ground station see the
+    /// silence.
+    pub fn end(mut self) {
+        self.service.stopping();
+        if matches!(self.onboard.state(), State::Engaged | State::Homing) {
+            self.onboard.say(Severity::Critical, format_args!("gleaner: stopped in flight, take over now"));
+            tracing::warn!("stopped in flight: take over now");
+        } else {
+            self.onboard.say(Severity::Warning, format_args!("gleaner: stopped"));
+        }
+        let end = Instant::now() + GOODBYE;
+        self.fly(|| Instant::now() >= end);
+        let decisions = self.onboard.stats().decisions;
+        tracing::info!("stopped after {decisions} decisions: setpoints and heartbeat have ended");
+        for line in self.links.summary() {
+            tracing::info!("{line}");
+        }
+        if self.links.loops() > 0 {
+            tracing::warn!(
+                "{} packets went around a loop: two ports reach the same network",
+                self.links.loops()
+            );
+        }
+        if let Some(kept) = self.kept {
+            kept.parameters.close();
+            kept.this_run.close(self.onboard.state(), unix_time_s());
+        }
+        self.links.close();
+        self.logs.close();
+    }
+}
+
+/// An older position is not logged.
+const MAX_POSITION_AGE: gleaner_units::Duration = gleaner_units::Duration::from_millis(2_000);
