@@ -2,7 +2,7 @@
 
 use super::{ConfigError, SigningConfig};
 use crate::logs::Limits;
-use gleaner_link::{Operators, Parameters};
+use gleaner_link::Parameters;
 use gleaner_pilot::Settings;
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
@@ -26,7 +26,6 @@ pub(super) struct File {
     pub state_dir: Option<PathBuf>,
     component_id: Option<Spanned<i64>>,
     system_id: Option<Spanned<i64>>,
-    operators: Option<Vec<Spanned<String>>>,
     signing: Option<SigningTable>,
     #[serde(default)]
     pub log: LogTable,
@@ -97,23 +96,7 @@ impl Source<'_> {
                 self.number("system_id", system_id, 1..=254, "or leave it out to adopt the autopilot's")?;
             settings.system_id = Some(id);
         }
-        if let Some(operators) = &file.operators {
-            settings.operators = self.operators(operators)?;
-        }
         Ok(settings)
-    }
-
-    fn operators(&self, texts: &[Spanned<String>]) -> Result<Operators, ConfigError> {
-        let mut operators = Operators::none();
-        for text in texts {
-            let at = |what: String| self.fault(text.span().start, format!("operators: {what}"));
-            let operator =
-                text.get_ref().parse().map_err(|error| at(format!("{:?}: {error}", text.get_ref())))?;
-            if !operators.add(operator) {
-                return Err(at(format!("more than {} entries", Operators::MAX)));
-            }
-        }
-        Ok(operators)
     }
 
     pub fn signing(&self, file: &File, folder: &Path) -> Result<Option<SigningConfig>, ConfigError> {

@@ -11,7 +11,6 @@
 //! state_dir = "state"                         # optional
 //! component_id = 191                          # optional
 //! system_id = 1                               # optional: needed where several autopilots are on the link
-//! operators = ["255", "*/190"]                # optional: system/component ids that may command
 //!
 //! [signing]                                   # optional
 //! key = "signing.key"                         # 64 hexadecimal digits or a passphrase, mode 600

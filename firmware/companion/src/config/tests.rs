@@ -124,18 +124,10 @@ fn several_ground_ports_and_log_limits_are_read() {
 }
 
 #[test]
-fn operators_and_signing_are_read() {
-    let more = "operators = [\"250\", \"*/195\"]\n";
-    let signing = "\n[signing]\nkey = \"signing.key\"\n";
-    let config = merged(&Setup::default(), &format!("{more}{TEXT}{signing}")).unwrap();
-    assert_ne!(config.settings.operators, Settings::default().operators);
-    let signing = config.signing.unwrap();
-    assert_eq!(
-        (signing.key.as_path(), &signing.ports[..]),
-        (Path::new("/etc/gleaner/signing.key"), &["ground".to_owned()][..])
-    );
-    let error = fault(&format!("operators = [\"0\"]\n{TEXT}"));
-    assert!(error.contains("line 1: operators: \"0\": an operator is SYSTEM"), "{error}");
+fn the_signing_table_is_read() {
+    let config = merged(&Setup::default(), &format!("{TEXT}\n[signing]\nkey = \"signing.key\"\n")).unwrap();
+    let signing = SigningConfig { key: "/etc/gleaner/signing.key".into(), ports: vec!["ground".into()] };
+    assert_eq!(config.signing, Some(signing));
     let error = fault(&format!("{TEXT}\n[signing]\nkey = \"k\"\nports = [\"radio\"]\n"));
     assert!(error.ends_with("line 15: signing.ports: \"radio\": a port is autopilot or ground"), "{error}");
 }
