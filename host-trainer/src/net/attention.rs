@@ -5,17 +5,14 @@
 //! [`Lanes`]; the spare lanes hold probability 0.
 
 use super::lanes::{LANES, Lanes, vectorised};
-use super::shape::{HEAD_WIDTH, HEADS, WIDTH};
-use super::workspace::Tokens;
+use super::shape::{HEAD_WIDTH, WIDTH};
+use super::workspace::{KEPT, Tokens};
 
 /// Numbers of one row of `q | k | v`.
 const QKV: usize = 3 * WIDTH;
 /// 1 / sqrt(16).
 const SCALE: f32 = 0.25;
 const _: () = assert!(HEAD_WIDTH == LANES && HEAD_WIDTH == 16);
-
-/// Probabilities kept for one token: a row of [`LANES`] for each head.
-pub(super) const KEPT: usize = HEADS * LANES;
 
 /// The sixteen numbers of `part` (0 query, 1 key, 2 value) of one head and one token.
 #[inline(always)]

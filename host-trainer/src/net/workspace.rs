@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
-use super::attention::KEPT;
 use super::batch::Batch;
 use super::lanes::LANES;
 use super::matrix::{CutWeights, Panels};
 use super::shape::{FIXED_TOKENS, HEAD_INPUTS, HEADS, LAYERS, Shape, TOKENS_MAX, WIDTH};
+
+/// Probabilities kept for one token: a row of [`LANES`] for each head.
+pub(super) const KEPT: usize = HEADS * LANES;
 
 /// Samples that go through the whole network together: few enough for their activations to stay
 /// in the second-level cache. Fixed, because the sums of gradients depend on it.

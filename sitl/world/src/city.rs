@@ -81,7 +81,7 @@ impl City {
     /// lot in eight empty, heights 6 m plus an exponential of mean 15 m, at most 50 m.
     #[must_use]
     pub fn generate(seed: u64) -> City {
-        City::new(generator::heights(seed)).expect("streets are open and heights are capped")
+        City::new(generator::heights(seed, City::CELL)).expect("streets are open and heights are capped")
     }
 
     /// This city as a mirror shows it.

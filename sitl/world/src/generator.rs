@@ -1,9 +1,8 @@
 //! Random cities.
 
-use crate::City;
 use crate::seed::{below, city_rng, open_unit};
 use core::ops::Range;
-use gleaner_units::{Cell, Grid, HeightMap};
+use gleaner_units::{Cell, Grid, HeightMap, Metres};
 use rand::Rng;
 
 const WIDTH: u16 = 40;
@@ -19,9 +18,9 @@ const LOWEST_M: f32 = 6.0;
 const MEAN_ABOVE_LOWEST_M: f32 = 15.0;
 const TALLEST_M: f32 = 50.0;
 
-/// The heights of the random city with this number.
-pub(crate) fn heights(seed: u64) -> HeightMap {
-    let grid = Grid::new(WIDTH, HEIGHT, City::CELL).expect("the size is a valid constant");
+/// The heights of the random city with this number; `cell` is the side of its cells.
+pub(crate) fn heights(seed: u64, cell: Metres) -> HeightMap {
+    let grid = Grid::new(WIDTH, HEIGHT, cell).expect("the size is a valid constant");
     let mut rng = city_rng(seed);
     let mut map = HeightMap::flat(grid);
     let columns = blocks(&mut rng, WIDTH as i16);
@@ -79,11 +78,13 @@ fn build(rng: &mut impl Rng, map: &mut HeightMap, x: Range<i16>, y: Range<i16>) 
 mod tests {
     use super::*;
 
+    const CELL: Metres = Metres(20.0);
+
     #[test]
     fn every_seed_gives_a_city_like_the_default_one() {
         let mut heights_m = Vec::new();
         for seed in 0..300 {
-            let map = heights(seed);
+            let map = heights(seed, CELL);
             let built = map.as_slice().iter().filter(|&&height_m| height_m > 0).count() as f32 / 1200.0;
             assert!((0.28..0.60).contains(&built), "city {seed} is {built} built");
             assert!(
@@ -102,7 +103,7 @@ mod tests {
     #[test]
     fn streets_run_through_the_whole_city() {
         for seed in 0..50 {
-            let map = heights(seed);
+            let map = heights(seed, CELL);
             let open = |cell: Cell| map.height_m(cell) == Some(0);
             assert!((0..40).filter(|&x| (0..30).all(|y| open(Cell::new(x, y)))).count() >= 4, "city {seed}");
             assert!((0..30).filter(|&y| (0..40).all(|x| open(Cell::new(x, y)))).count() >= 3, "city {seed}");
