@@ -80,3 +80,6 @@ impl<B: Board> Services<B> {
         matches!(state, State::Engaged | State::Homing)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,6 @@
-//! Doubles of `embedded-hal` pins and delays. They panic where hardware would hide a mistake.
+//! Doubles of `embedded-hal` pins and delays and of a flash controller. They panic where hardware would hide a mistake.
 
+use crate::FlashController;
 use core::cell::{Cell, RefCell};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin, PinState};
@@ -104,5 +105,95 @@ impl DelayNs for Delay {
     fn delay_ns(&mut self, ns: u32) {
         assert!(ns <= 1_000_000, "a single delay of {ns} ns");
         self.0.set(self.0.get() + ns / 1000);
+    }
+}
+
+/// Bytes of a sector of [`Controller`].
+pub(crate) const SECTOR: usize = 64;
+const UNIT: usize = 8;
+
+/// A controller that panics where hardware would fault or ignore the request.
+pub(crate) struct Controller {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) unlocked: bool,
+    /// Looks at the busy flag until an operation ends; `None` never.
+    pub(crate) takes: Option<u32>,
+    busy: Cell<Option<u32>>,
+    pub(crate) accepts: bool,
+    pub(crate) fails: bool,
+    pub(crate) locks: u32,
+}
+
+impl Controller {
+    pub(crate) fn new() -> Controller {
+        Controller {
+            bytes: std::vec![0xFF; 2 * SECTOR],
+            unlocked: false,
+            takes: Some(3),
+            busy: Cell::new(Some(0)),
+            accepts: true,
+            fails: false,
+            locks: 0,
+        }
+    }
+
+    fn start(&mut self) -> bool {
+        assert!(self.unlocked, "an operation on a locked controller is a bus fault");
+        assert_eq!(self.busy.get(), Some(0), "an operation while another one runs");
+        if self.accepts {
+            self.busy.set(self.takes);
+        }
+        self.accepts
+    }
+}
+
+impl FlashController for Controller {
+    const SECTOR_BYTES: usize = SECTOR;
+    const WRITE_BYTES: usize = UNIT;
+    const OPERATION_LIMIT_MS: u32 = 20;
+
+    fn read(&self, offset: u32, bytes: &mut [u8]) {
+        assert!(offset.is_multiple_of(4) && bytes.len().is_multiple_of(4), "whole words");
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
+    }
+
+    fn unlock(&mut self) {
+        assert!(!self.unlocked, "two unlock sequences lock the controller until the next reset");
+        self.unlocked = true;
+    }
+
+    fn start_erase(&mut self, sector: u32) -> bool {
+        let accepted = self.start();
+        if accepted {
+            self.bytes[sector as usize * SECTOR..][..SECTOR].fill(0xFF);
+        }
+        accepted
+    }
+
+    fn start_write(&mut self, offset: u32, unit: &[u8]) -> bool {
+        assert!(offset.is_multiple_of(UNIT as u32) && unit.len() == UNIT);
+        let accepted = self.start();
+        if accepted {
+            let place = &mut self.bytes[offset as usize..][..UNIT];
+            assert!(place.iter().all(|&byte| byte == 0xFF), "a unit is written once between erases");
+            place.copy_from_slice(unit);
+        }
+        accepted
+    }
+
+    fn is_busy(&self) -> bool {
+        let Some(left) = self.busy.get() else { return true };
+        self.busy.set(Some(left.saturating_sub(1)));
+        left > 0
+    }
+
+    fn has_failed(&self) -> bool {
+        assert_eq!(self.busy.get(), Some(0), "the error flags are valid after the operation only");
+        self.fails
+    }
+
+    fn lock(&mut self) {
+        self.unlocked = false;
+        self.locks += 1;
     }
 }
