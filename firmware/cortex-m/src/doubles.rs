@@ -116,9 +116,9 @@ const UNIT: usize = 8;
 pub(crate) struct Controller {
     pub(crate) bytes: Vec<u8>,
     pub(crate) unlocked: bool,
-    /// Looks at the busy flag until an operation ends; `None` never.
+    /// Reads of the busy flag until an operation ends; `None` never.
     pub(crate) takes: Option<u32>,
-    busy: Cell<Option<u32>>,
+    pub(crate) busy: Cell<Option<u32>>,
     pub(crate) accepts: bool,
     pub(crate) fails: bool,
     pub(crate) locks: u32,
