@@ -1,20 +1,21 @@
 //! Live SNR reports without I/O: bytes to reports, and the table of devices.
 //!
 //! # What it owns
-//! The wire format between a radio modem and us, and what was last heard of each device on the ground. Which
-//! device is served, and what its SNR means, is decided elsewhere.
+//! The formats of radio reports, and the last report of each device on the ground. Which device is served, and what its
+//! SNR means, is decided elsewhere.
 //!
 //! # Glossary
-//! - **device**: one sensor on the ground, named by a 32-bit id that the mission lists.
-//! - **report**: what the modem measured of one device at one time ([`Report`]).
-//! - **age**: how long before its arrival a report was measured, plus how long ago it arrived.
-//! - **remaining**: data units that the device still holds, if it tells.
+//! - **device**: one sensor on the ground, named by a 32-bit id that the mission lists; for LoRaWAN its DevAddr.
+//! - **report**: one measurement of one device ([`Report`]).
+//! - **format**: the bytes in which a radio reports ([`Format`]).
+//! - **age**: time from the measurement to the arrival of its report, plus the time since.
+//! - **remaining**: data units that the device still holds, if its report says.
 //!
 //! # Wire format
-//! One report is one frame between zero bytes: `00 COBS(body crc) 00`. A zero byte comes before it as well, so
-//! that whatever noise came earlier cannot cling to it. Empty frames mean nothing.
+//! One report is one frame between zero bytes: `00 COBS(body crc) 00`. The zero byte in front ends any noise before the
+//! frame. Empty frames are ignored.
 //!
-//! | part | what it is |
+//! | part | content |
 //! |---|---|
 //! | `body` | postcard: device (varint u32), SNR in dB (f32, little endian), remaining (0, or 1 and an f32), age in ms (varint u32) |
 //! | `crc` | CRC-16/IBM-SDLC of the body, low byte first (check value of "123456789": 0x906E) |
@@ -41,12 +42,13 @@
 //! assert_eq!(decoder.stats().reports, 1);
 //! ```
 //!
-//! Inside a MAVLink `TUNNEL` the body travels alone: the MAVLink frame has its own checksum
+//! Inside a MAVLink `TUNNEL` the body stands alone: the MAVLink frame has its own checksum
 //! ([`decode_body`]).
 //!
 //! # When you may trust what
-//! A decoded [`Report`] has a finite SNR and a remaining amount that is finite and not negative; anything else
-//! was refused and counted. Its device may be unknown: [`DeviceTable`] counts and ignores those.
+//! A decoded [`Report`] has a correct checksum, and any numbers. [`DeviceTable`] checks them, once for all formats: what it
+//! holds is finite, no remaining amount exceeds the mission's figure, and none falls faster than slots can carry data.
+//! Reports of unknown devices are counted and ignored.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -55,20 +57,24 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "host"))]
 extern crate std;
 
-/// The same cases in every run.
+/// Fixed seed for property tests.
 #[cfg(test)]
 fn seeded() -> proptest::test_runner::Config {
     use proptest::test_runner::{Config, RngSeed};
     Config { rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::default() }
 }
 
-mod decoder;
+mod format;
+mod reception;
 mod report;
 mod table;
 
-pub use decoder::{ReportDecoder, ReportStats};
+pub use format::{Calibration, Format, ReportDecoder, ReportStats, required_snr};
+#[cfg(feature = "host")]
+pub use format::{JsonLines, SemtechUdp};
+pub use reception::{Likely, Reception, Remark};
 pub use report::{BODY_BYTES, FrameBytes, Report, ReportFault, decode_body, encode, encode_body};
-pub use table::{Applied, DeviceTable, TableError};
+pub use table::{Applied, DeviceTable, TableError, TableStats};

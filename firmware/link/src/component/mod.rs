@@ -1,7 +1,10 @@
 //! The component as a whole: bytes in, bytes out, events to its owner.
 
 mod answering;
+mod blocks;
 mod sending;
+
+use self::blocks::Duplicate;
 
 use crate::address::Address;
 use crate::autopilot_command::AutopilotCommand;
@@ -12,7 +15,7 @@ use crate::operators::Operators;
 use crate::parameters::{ParameterError, ParameterId, Parameters};
 use crate::service::autopilot::{Autopilot, is_autopilot};
 use crate::service::commands::Answers;
-use crate::service::identity::{Identity, Settled};
+use crate::service::identity::Identity;
 use crate::service::parameters::ParameterService;
 use crate::service::requests::Requests;
 use crate::service::steering::Steering;
@@ -33,13 +36,6 @@ struct EnableSet {
     sender: Address,
     value: f32,
     at: Instant,
-}
-
-/// Heartbeats with our own ids that we did not send.
-#[derive(Clone, Copy, Debug, Default)]
-struct Duplicate {
-    heartbeats: u8,
-    last_at: Option<Instant>,
 }
 
 /// Where a ground station finds the component's metadata (MAVLink guide, "Component Metadata Protocol").
@@ -82,11 +78,6 @@ impl Component {
     /// After this long without any autopilot the first system id is used, so that routers learn of us.
     const PATIENCE: Duration = Duration::from_secs(5);
     const HEARTBEAT_PERIOD: Duration = Duration::from_secs(1);
-    /// A component with our ids that was silent for this long is gone.
-    const DUPLICATE_GONE: Duration = Duration::from_secs(10);
-    /// One may be a late echo of ours; two are another component.
-    const DUPLICATE_HEARTBEATS: u8 = 2;
-
     /// A component before the first byte.
     #[must_use]
     pub fn new(settings: Settings, parameters: Parameters) -> Component {
@@ -300,50 +291,6 @@ impl Component {
         self.metadata.is_some()
     }
 
-    fn report_identity(&mut self, settled: Settled) {
-        let own = self.identity.own();
-        match settled {
-            Settled::Configured(_) | Settled::Adopted(_) => {
-                self.say(
-                    Severity::Info,
-                    format_args!("gleaner: system {}, component {}", own.system, own.component),
-                );
-            }
-            // The reason not to engage is reported with all others.
-            Settled::Several => {}
-        }
-    }
-
-    /// Reports a new reason not to engage.
-    fn watch_block(&mut self, now: Instant) {
-        let is_duplicate = self.duplicate.heartbeats >= Component::DUPLICATE_HEARTBEATS
-            && self.duplicate.last_at.is_some_and(|at| now.since(at) < Component::DUPLICATE_GONE);
-        let block = if is_duplicate {
-            Some(EngageBlock::DuplicateId)
-        } else if let Some(system) = self.identity.rival(now) {
-            Some(EngageBlock::SeveralAutopilots(system))
-        } else {
-            self.autopilot.unsupported_vehicle().map(EngageBlock::NotMultirotor)
-        };
-        if block == self.block {
-            return;
-        }
-        self.block = block;
-        let own = self.identity.own();
-        match block {
-            None => {}
-            Some(EngageBlock::DuplicateId) => {
-                self.say(Severity::Critical, format_args!("gleaner: another component has our id {own}"));
-            }
-            Some(EngageBlock::SeveralAutopilots(_)) => {
-                self.say(Severity::Critical, format_args!("gleaner: several autopilots: set system_id"));
-            }
-            Some(EngageBlock::NotMultirotor(vehicle)) => {
-                self.say(Severity::Critical, format_args!("gleaner: MAV_TYPE {vehicle} is no multirotor"));
-            }
-        }
-    }
-
     /// One message of `frame`.
     fn take(&mut self, now: Instant, frame: &Frame, message: &Message) {
         let (own, sender) = (self.identity.own(), frame.sender);
@@ -364,20 +311,6 @@ impl Component {
             self.take_from_vehicle(now, sender, message);
         }
         self.answer(now, sender, message);
-    }
-
-    /// A message with our own ids: an echo of ours, which a router may return, or another component with the same ids.
-    /// An echoed heartbeat has the sequence number of one that we sent.
-    fn watch_own_id(&mut self, now: Instant, frame: &Frame, message: &Message) {
-        if !matches!(message, Message::Heartbeat(_)) || self.outgoing.sent_heartbeat(frame.sequence) {
-            return;
-        }
-        count(&mut self.stats.duplicate_id);
-        if self.duplicate.last_at.is_none_or(|at| now.since(at) >= Component::DUPLICATE_GONE) {
-            self.duplicate.heartbeats = 0;
-        }
-        self.duplicate.heartbeats = self.duplicate.heartbeats.saturating_add(1);
-        self.duplicate.last_at = Some(now);
     }
 
     fn take_from_vehicle(&mut self, now: Instant, sender: Address, message: &Message) {

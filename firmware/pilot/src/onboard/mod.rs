@@ -21,7 +21,7 @@ use gleaner_link::{
     AutopilotCommand, Component, Enable, LinkStats, ParameterId, Parameters, Severity, Status,
 };
 use gleaner_policy::{DeviceState, Policy, SelfTestError};
-use gleaner_radio::ReportStats;
+use gleaner_radio::{Report, ReportStats, TableStats};
 use gleaner_units::{BatteryUnits, Cell, Duration, Instant};
 use heapless::Vec;
 
@@ -52,8 +52,8 @@ pub struct Stats {
     pub radio: ReportStats,
     /// Reports that came by `TUNNEL` and were no reports.
     pub tunnel_refused: u32,
-    /// Reports of devices that are not of this mission.
-    pub unknown_reports: u32,
+    /// Counters of the reports of all sources.
+    pub reports: TableStats,
 }
 
 /// The whole pilot. Feed it bytes, poll it at 20 Hz or more, carry its bytes away.
@@ -131,7 +131,7 @@ impl<P: Policy> Onboard<P> {
         self.machine.load(mission, self_test.is_ok())?;
         for site in &mission.devices {
             // The capacities are the same, and the mission's check has found doubles already.
-            let _ = self.heard.table.add(site.id);
+            let _ = self.heard.table.add(site.id, site.data);
         }
         Ok(())
     }
@@ -144,6 +144,28 @@ impl<P: Policy> Onboard<P> {
     /// Bytes from the radio: postcard reports in COBS, in any pieces.
     pub fn receive_radio(&mut self, now: Instant, bytes: &[u8]) {
         self.heard.receive(now, bytes);
+    }
+
+    /// A report of another format, decoded by the program.
+    pub fn receive_report(&mut self, now: Instant, report: &Report) {
+        self.heard.report(now, report);
+    }
+
+    /// Bytes of the radio that the program decodes. They are only counted: bytes without reports are reported to the
+    /// operator.
+    pub fn observe_radio(&mut self, bytes: &[u8]) {
+        self.heard.see(bytes);
+    }
+
+    /// One datagram of the autopilot's link.
+    pub fn receive_link_datagram(&mut self, now: Instant, datagram: &[u8]) {
+        self.link.receive_datagram(now, datagram);
+    }
+
+    /// One frame of the autopilot's link or of another port, from a decoder of the program's own
+    /// ([`gleaner_link::Signing`]).
+    pub fn receive_frame(&mut self, now: Instant, frame: &gleaner_link::Frame) {
+        self.link.receive_frame(now, frame);
     }
 
     /// One step: decides what to send. The model runs inside. Call at 20 Hz or more. Heartbeat and targets leave from
@@ -167,7 +189,12 @@ impl<P: Policy> Onboard<P> {
             engage_inhibited: self.engage_inhibited,
         };
         let out = self.machine.poll(now, &inputs, &mut self.policy);
+        if out.decided {
+            self.heard.table.begin_slot();
+        }
         self.send(now, &out);
+        let link = &mut self.link;
+        self.heard.remarks(now, |remark| link.say(Severity::Warning, format_args!("gleaner: {remark}")));
         let status = Status {
             state: self.machine.system_state(),
             may_engage: self.machine.may_engage(),
@@ -245,7 +272,7 @@ impl<P: Policy> Onboard<P> {
             link: self.link.stats(),
             radio: self.heard.decoder.stats(),
             tunnel_refused: self.tunnel_refused,
-            unknown_reports: self.heard.table.unknown_reports(),
+            reports: self.heard.table.stats(),
         }
     }
 

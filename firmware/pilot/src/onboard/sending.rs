@@ -55,19 +55,16 @@ impl<P: Policy> Onboard<P> {
     fn send_telemetry(&mut self, now: Instant, out: &Outputs) {
         let Some(telemetry) = out.telemetry else { return };
         let infer_us = self.inference_time.map(|took| took.as_micros() as f32);
-        let values = [
-            ("w_data", Some(telemetry.w_data)),
-            ("collected", Some(telemetry.collected)),
-            ("spare_bat", telemetry.spare.map(|spare| spare.0)),
-            ("infer_us", infer_us),
-            ("attn_dev", telemetry.attended.map(f32::from)),
-            ("unit_pct", Some(telemetry.unit_pct)),
-            ("land_pct", telemetry.land_pct),
-        ];
-        for (name, value) in values {
-            if let Some(value) = value {
-                self.link.telemetry(now, name, value);
-            }
-        }
+        let values = gleaner_link::Telemetry {
+            data_weight: Some(telemetry.w_data),
+            collected: Some(telemetry.collected),
+            spare_units: telemetry.spare.map(|spare| spare.0),
+            inference_us: infer_us,
+            attended_device: telemetry.attended.map(f32::from),
+            unit_percent: Some(telemetry.unit_pct),
+            landing_percent: telemetry.land_pct,
+            snr_offset_db: None,
+        };
+        self.link.send_telemetry(now, &values);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{MissionError, Rules};
 use core::fmt;
-use gleaner_link::SettingsError;
+use gleaner_link::{Operators, SettingsError};
 
 /// Our identity on the link, and our limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,13 +11,20 @@ pub struct Settings {
     pub system_id: Option<u8>,
     /// MAVLink component id, 191 unless something else on the vehicle has it.
     pub component_id: u8,
+    /// Ground stations that may command.
+    pub operators: Operators,
     /// Limits of the mission machine.
     pub rules: Rules,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { system_id: None, component_id: 191, rules: Rules::DEFAULT }
+        Settings {
+            system_id: None,
+            component_id: 191,
+            operators: Operators::default(),
+            rules: Rules::DEFAULT,
+        }
     }
 }
 
@@ -28,6 +35,7 @@ impl Settings {
     /// The ids are impossible.
     pub fn checked(self) -> Result<gleaner_link::Settings, SettingsError> {
         gleaner_link::Settings::new(self.system_id, self.component_id)
+            .map(|settings| settings.with_operators(self.operators))
     }
 }
 

@@ -331,7 +331,7 @@ fn reports_count_from_the_radio_and_from_the_tunnel() {
     bench.run(4);
     let stats = bench.onboard.stats();
     assert_eq!(stats.collected, 0.5, "4000 of 8000 are left");
-    assert_eq!((stats.tunnel_refused, stats.unknown_reports, stats.radio.reports), (1, 1, 2));
+    assert_eq!((stats.tunnel_refused, stats.reports.unknown, stats.radio.reports), (1, 1, 2));
     let asked = bench.onboard.policy().asked.last().unwrap();
     assert_eq!([asked.devices[0][3], asked.devices[1][3]], [11.0, 6.0], "each in its own token");
     bench.run(15);
