@@ -43,13 +43,13 @@ impl Likely {
 impl fmt::Display for Likely {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Likely::Json => "JSON: set format",
-            Likely::Semtech => "Semtech UDP: set format",
-            Likely::MavLink => "this is MAVLink",
-            Likely::Nmea => "this is NMEA",
-            Likely::AtModem => "this is an AT modem",
-            Likely::Meshtastic => "this is Meshtastic",
-            Likely::Unknown => "wrong format or baud?",
+            Likely::Json => "looks like JSON",
+            Likely::Semtech => "is it Semtech UDP?",
+            Likely::MavLink => "looks like MAVLink",
+            Likely::Nmea => "looks like NMEA",
+            Likely::AtModem => "is it an AT modem?",
+            Likely::Meshtastic => "is it Meshtastic?",
+            Likely::Unknown => "format or baud?",
         })
     }
 }
@@ -172,13 +172,13 @@ mod tests {
     #[test]
     fn bytes_without_reports_are_named_with_a_likely_cause() {
         for (bytes, cause) in [
-            (&b"+RCV=1,5,HELLO,-99,40\r\n"[..], "this is an AT modem"),
-            (b"$GPGGA,123519,4807.038,N\r\n", "this is NMEA"),
-            (b"{\"id\":1,\"snr_db\":2.5}\n", "JSON: set format"),
-            (&[0x94, 0xC3, 0, 16, 1, 2, 3], "this is Meshtastic"),
-            (&[2, 0x12, 0x34, 0, 0xAA, 0x55], "Semtech UDP: set format"),
-            (&[0xFD, 9, 0, 0, 1], "this is MAVLink"),
-            (&[0x55, 0xAA, 0x17, 0x99], "wrong format or baud?"),
+            (&b"+RCV=1,5,HELLO,-99,40\r\n"[..], "is it an AT modem?"),
+            (b"$GPGGA,123519,4807.038,N\r\n", "looks like NMEA"),
+            (b"{\"id\":1,\"snr_db\":2.5}\n", "looks like JSON"),
+            (&[0x94, 0xC3, 0, 16, 1, 2, 3], "is it Meshtastic?"),
+            (&[2, 0x12, 0x34, 0, 0xAA, 0x55], "is it Semtech UDP?"),
+            (&[0xFD, 9, 0, 0, 1], "looks like MAVLink"),
+            (&[0x55, 0xAA, 0x17, 0x99], "format or baud?"),
         ] {
             let said = remarks(bytes);
             assert_eq!(said, [std::format!("radio: {} bytes, 0 reports: {cause}", 11 * bytes.len())]);

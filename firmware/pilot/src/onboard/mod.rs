@@ -194,7 +194,7 @@ impl<P: Policy> Onboard<P> {
         }
         self.send(now, &out);
         let link = &mut self.link;
-        self.heard.remarks(now, |remark| link.say(Severity::Warning, format_args!("gleaner: {remark}")));
+        self.heard.remarks(now, |remark| link.say(Severity::Warning, format_args!("{remark}")));
         let status = Status {
             state: self.machine.system_state(),
             may_engage: self.machine.may_engage(),
