@@ -1,5 +1,6 @@
 //! The sizes of the network, and where each tensor lies in the flat parameter vector.
 
+use gleaner_policy::schema::FEATURES;
 use rand::{Rng, RngExt};
 
 /// Width of a token and of everything the encoder passes on.
@@ -10,24 +11,47 @@ pub const HEADS: usize = 4;
 pub const HEAD_WIDTH: usize = WIDTH / HEADS;
 /// Encoder layers.
 pub const LAYERS: usize = 2;
-/// Most devices a sample may hold, the K_max of the observation contract.
-pub const DEVICES_MAX: usize = 12;
+/// Most devices a sample may hold: K_max of the observation contract.
+pub const DEVICES_MAX: usize = gleaner_policy::K_MAX;
 /// Tokens that every sample has: UAV, preference and local map, in this order.
 pub const FIXED_TOKENS: usize = 3;
 /// Tokens of a sample with every device present.
 pub const TOKENS_MAX: usize = FIXED_TOKENS + DEVICES_MAX;
 /// Features of the UAV token.
-pub const UAV_FEATURES: usize = 4;
+pub const UAV_FEATURES: usize = feature_count("uav");
 /// Features of one device token of the policy that flies.
-pub const DEVICE_FEATURES: usize = 7;
+pub const DEVICE_FEATURES: usize = feature_count("devices");
 /// Features of the preference token.
-pub const PREFERENCE_FEATURES: usize = 2;
+pub const PREFERENCE_FEATURES: usize = feature_count("preference");
 /// Numbers of the local map of the policy that flies.
 pub const MAP_CELLS: usize = gleaner_policy::LOCAL_MAP_CELLS;
 /// What the head reads: UAV, preference, map and the pooled devices.
 pub const HEAD_INPUTS: usize = 4 * WIDTH;
 /// Added to the variance in every layer norm.
 pub const LAYER_NORM_EPSILON: f32 = 1e-5;
+
+/// Features of one token in the observation schema, so that a new feature changes the schema only.
+const fn feature_count(tensor: &str) -> usize {
+    let (mut count, mut index) = (0, 0);
+    while index < FEATURES.len() {
+        if is_same(FEATURES[index].tensor.as_bytes(), tensor.as_bytes()) {
+            count += 1;
+        }
+        index += 1;
+    }
+    count
+}
+
+const fn is_same(a: &[u8], b: &[u8]) -> bool {
+    let mut index = 0;
+    while index < a.len() && index < b.len() {
+        if a[index] != b[index] {
+            return false;
+        }
+        index += 1;
+    }
+    a.len() == b.len()
+}
 
 /// The sizes that differ between networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
