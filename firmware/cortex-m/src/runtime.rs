@@ -115,7 +115,13 @@ where
                 log.losses(name, stats);
             }
         }
+        let revocations = self.onboard.revocations();
         self.onboard.poll(now);
+        if self.onboard.revocations() != revocations {
+            // Nothing that moves the aircraft may leave any more. The rest of a frame that left in part is missing at the
+            // receiver, which discards it by its checksum.
+            self.transmission.start = self.transmission.end;
+        }
         let took = self.onboard.policy().take();
         if let Some(took) = took {
             self.onboard.set_inference_time(took);

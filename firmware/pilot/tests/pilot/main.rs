@@ -1,6 +1,8 @@
 //! The pilot from outside, in virtual time.
 
 mod authority;
+mod authority_onboard;
+mod bench;
 mod explorer;
 mod facts;
 mod flight;

@@ -37,7 +37,8 @@ fn a_failed_self_test_refuses_every_request_for_good() {
 #[test]
 fn each_missing_condition_holds_the_start_back_and_is_told_once() {
     type Spoil = fn(&mut Rig);
-    let cases: [(Missing, Spoil); 13] = [
+    let cases: [(Missing, Spoil); 14] = [
+        (Missing::Permission, |rig| rig.engage_inhibited = true),
         (Missing::Autopilot, |rig| rig.vehicle.mode = None),
         (Missing::Heartbeat, |rig| rig.beats = false),
         (Missing::Origin, |rig| rig.vehicle.origin = None),
