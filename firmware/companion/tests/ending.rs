@@ -25,6 +25,22 @@ fn is_return(message: &Message) -> bool {
 }
 
 #[test]
+fn sigterm_in_flight_hands_the_aircraft_back() {
+    let fixture = Fixture::new();
+    let mut running = Running::start(&mut fixture.gleaner("run"));
+    let mut autopilot = FakeAutopilot::find(&mut running);
+    autopilot.engage();
+    running.process.signal("TERM");
+    autopilot.until(|_, message| is_return(message).then_some(()));
+    // The operator's LOITER ends the request at once.
+    autopilot.custom_mode = LOITER;
+    autopilot.send_state();
+    let (code, rest) = running.stop();
+    assert_eq!(code, Some(0), "{rest}");
+    assert!(rest.contains("stopped in flight, take over now"), "{rest}");
+}
+
+#[test]
 fn a_killed_run_is_reported_by_the_next_one() {
     let fixture = Fixture::new();
     let mut running = Running::start(&mut run_with_state(&fixture));

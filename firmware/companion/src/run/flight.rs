@@ -10,7 +10,7 @@ use crate::clock;
 use crate::logs::LogNews;
 use crate::routing::Links;
 use gleaner_link::{MAX_FRAME_BYTES, Severity};
-use gleaner_pilot::{Onboard, POLL_INTERVAL, State};
+use gleaner_pilot::{Onboard, POLL_INTERVAL};
 use gleaner_policy::{Engine, Timed};
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use std::time::{Duration, Instant};
@@ -24,6 +24,8 @@ const READS_PER_TURN: usize = 32;
 const LATE: Duration = Duration::from_millis(300);
 /// Turns of reading after a pause: 8,192 datagrams a port, more than the system keeps.
 const DRAIN_TURNS: usize = 256;
+/// Time to give the aircraft back when the program is asked to end.
+const HAND_BACK: Duration = Duration::from_secs(3);
 /// Time for the last messages: status texts leave at ten a second.
 const GOODBYE: Duration = Duration::from_millis(300);
 /// Time between two reports of the traffic.
@@ -56,7 +58,7 @@ impl Flight {
     ) -> Flight {
         let now = Instant::now();
         let mut flight = Flight {
-            revocations: onboard.link().revocations(),
+            revocations: onboard.revocations(),
             onboard,
             links,
             radio,
@@ -154,7 +156,7 @@ impl Flight {
 
     /// After a take-over nothing of ours that moves the aircraft may leave, not even from the queues of the ports.
     fn revoke(&mut self) {
-        let revocations = self.onboard.link().revocations();
+        let revocations = self.onboard.revocations();
         if std::mem::replace(&mut self.revocations, revocations) != revocations {
             let dropped = self.links.revoke();
             tracing::debug!("revoked: {dropped} queued frames dropped");
@@ -250,9 +252,18 @@ impl Flight {
     /// silence.
     pub fn end(mut self) {
         self.service.stopping();
-        if matches!(self.onboard.state(), State::Engaged | State::Homing) {
+        if self.onboard.state().flies() {
             self.onboard.say(Severity::Critical, format_args!("gleaner: stopped in flight, take over now"));
-            tracing::warn!("stopped in flight: take over now");
+            tracing::warn!("stopped in flight: requesting the autopilot to return");
+            self.onboard.hand_back();
+            let patience = Instant::now() + HAND_BACK;
+            while self.onboard.is_handing_back() && Instant::now() < patience {
+                let tick = Instant::now() + TICK;
+                self.fly(|| Instant::now() >= tick);
+            }
+            if self.onboard.is_handing_back() {
+                tracing::error!("the autopilot has not accepted to return: take over now");
+            }
         } else {
             self.onboard.say(Severity::Warning, format_args!("gleaner: stopped"));
         }

@@ -42,7 +42,7 @@ struct SweepArguments {
     /// Missions in which nothing goes wrong, without the reserve for it.
     #[arg(long)]
     calm: bool,
-    /// The model [default: models/gleaner.onnx].
+    /// The model [default: the built-in one].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
     /// What runs the model: tract or native.
@@ -76,7 +76,7 @@ struct MissionArguments {
     /// Battery units kept back on top of the way home; 0 is the paper's safety controller.
     #[arg(long, value_name = "UNITS", default_value = "0", value_parser = units)]
     reserve: f32,
-    /// The model [default: models/gleaner.onnx].
+    /// The model [default: the built-in one].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
     /// What runs the model: tract or native.

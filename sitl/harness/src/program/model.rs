@@ -4,27 +4,22 @@ use super::ProgramError;
 use super::results::Brain;
 use gleaner_policy::{Engine, EngineKind};
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The shipped model, relative to the folder that the programs are installed or built in.
-const SHIPPED: &str = "models/gleaner.onnx";
+/// The shipped model, part of the program: a copied binary flies.
+const SHIPPED: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/gleaner.onnx"));
 
 /// Loads the model and lets it prove itself.
 pub(super) fn load(path: Option<&Path>, engine: EngineKind) -> Result<Engine, ProgramError> {
-    let path = path.map_or_else(shipped, Path::to_owned);
+    let Some(path) = path.map(Path::to_owned) else {
+        let unfit = |source| ProgramError::Model { path: "built in".into(), source };
+        return Engine::load_checked(SHIPPED, engine).map_err(unfit);
+    };
     let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
         ErrorKind::NotFound => ProgramError::ModelMissing(path.clone()),
         _ => ProgramError::ModelRead { path: path.clone(), source },
     })?;
     Engine::load_checked(&bytes, engine).map_err(|source| ProgramError::Model { path, source })
-}
-
-/// Next to the program, else in the source tree that it was built from.
-fn shipped() -> PathBuf {
-    let beside = std::env::current_exe().ok().and_then(|program| Some(program.parent()?.join(SHIPPED)));
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(SHIPPED);
-    let source = source.canonicalize().unwrap_or(source);
-    beside.filter(|path| path.exists()).unwrap_or(source)
 }
 
 /// How a model is called in summaries: its name, its version and the beginning of its hash.
