@@ -2,7 +2,7 @@
 
 use gleaner_host_trainer::judge::evaluation::{evaluate_greedy, realizations, test_preferences};
 use gleaner_host_trainer::planner::oracle::{OracleSetting, Thoroughness, consult};
-use gleaner_host_trainer::planner::{Effort, Problem, Rates, State, Tour};
+use gleaner_host_trainer::planner::{Effort, Problem, Rates, Tour, initial_state};
 use gleaner_units::{Action, BatteryUnits};
 use gleaner_world::{Realization, ScenarioKind, Seed, World};
 use rand::SeedableRng;
@@ -42,8 +42,8 @@ fn every_tour_of_the_search_can_be_flown() {
         let battery = BatteryUnits(40.0 + 2.0 * number as f32);
         let scenario = kind.scenario().with_devices(1 + number as usize % 12).with_battery(battery);
         let realization = Realization::draw(world.city(), &scenario, Seed::training(number)).unwrap();
-        let (known, state) = (rates.study(&realization), State::start(&realization));
-        let problem = Problem { known: &known, state: &state, w_data: 0.9 };
+        let (known, state) = (rates.study(&realization), initial_state(&realization));
+        let problem = Problem { model: &known, state: &state, w_data: 0.9 };
         // A high temperature to the end gives an arbitrary tour.
         let hot = Effort { tours: 300, temperatures: [1e6, 1e6] };
         for tour in [problem.anneal(Tour::default(), hot, &mut rng).1, Tour::default()] {
@@ -66,7 +66,7 @@ fn planned_data_is_the_mean_of_flown_data() {
     let scenario = ScenarioKind::ReachDestination.scenario().with_devices(1);
     let realization = Realization::draw(world.city(), &scenario, Seed::training(7)).unwrap();
     let known = rates.study(&realization);
-    let mut planned = State::start(&realization);
+    let mut planned = initial_state(&realization);
     planned.remaining[0] = f32::INFINITY;
     let above = realization.devices()[0].cell;
     planned.cell = above;

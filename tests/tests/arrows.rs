@@ -6,21 +6,22 @@ use std::path::Path;
 use std::process::Command;
 
 /// Folder and rank of every member.
-const RANKS: [(&str, u8); 14] = [
+const RANKS: [(&str, u8); 15] = [
     ("firmware/units", 0),
     ("firmware/ports", 0),
     ("firmware/guard", 1),
     ("firmware/policy", 1),
     ("firmware/link", 1),
     ("firmware/radio", 1),
-    ("firmware/pilot", 2),
-    ("firmware/dashboard", 3),
-    ("firmware/companion", 4),
-    ("firmware/cortex-m", 4),
+    ("firmware/lookahead", 2),
+    ("firmware/pilot", 3),
+    ("firmware/dashboard", 4),
+    ("firmware/companion", 5),
+    ("firmware/cortex-m", 5),
     ("sitl/world", 1),
-    ("sitl/harness", 4),
-    ("host-trainer", 4),
-    ("tests", 5),
+    ("sitl/harness", 5),
+    ("host-trainer", 5),
+    ("tests", 6),
 ];
 
 /// Every dependency between members, as folders: (dependent, dependency). Those of tests and benches count too.

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 /// The largest weight of data that is planned with. With data alone, all tours that collect the same data would be equal,
 /// and the search would not find the shorter one.
-pub(crate) const W_DATA_MAX: f32 = 0.98;
+pub const W_DATA_MAX: f32 = 0.98;
 /// Temperatures of a search from scratch, and of a search from the kept plan; percent of the data.
 const FRESH: [f32; 2] = [1.0, 0.1];
 const ONWARD: [f32; 2] = [0.5, 0.05];
@@ -27,6 +27,8 @@ const REPORTS_PER_CELL: f32 = 4.0;
 /// two reports from one cell.
 const OVERRIDE: f32 = 6.0;
 const EVIDENCE_MAX: f32 = 4.0;
+/// Information of a report that contradicts the map, compared to one that agrees with it.
+const DOUBTFUL: f32 = 0.25;
 
 /// The effort of one decision, in tours (see [`Effort::tours`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -302,6 +304,10 @@ impl<const D: usize> LookAhead<D> {
                 }
             } else if other - same < EVIDENCE_MAX {
                 self.fit.update(&self.settings, &self.channel, (mapped, log10_m), snr_db, weight);
+            } else {
+                // The map is probably wrong here, but the report is not certain evidence of the other condition either.
+                let weight = weight * DOUBTFUL;
+                self.fit.update(&self.settings, &self.channel, (!mapped, log10_m), snr_db, weight);
             }
         }
     }

@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 const PARAMETERS: usize = 4;
 /// Distance at which the gains are estimated, decimal logarithm of metres: 100 m.
 const REFERENCE_LOG10_M: f32 = 2.0;
+/// Mean of the square of a standard normal number, clipped at 1.
+const CLIPPED_NORMAL: f32 = 0.516;
 
 /// Constants of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,10 +46,10 @@ impl FitSettings {
         shared_exponent: 0.2,
         own_exponent: 0.1,
         gain_drift_db2: 0.002,
-        outlier: 3.0,
-        variance_reports: 20.0,
+        outlier: 2.0,
+        variance_reports: 10.0,
         variance_memory: 200.0,
-        excess_max_db: 10.0,
+        excess_max_db: 8.0,
     };
 }
 
@@ -59,6 +61,7 @@ pub struct ChannelFit {
     covariance: [[f32; PARAMETERS]; PARAMETERS],
     /// Variance of the residuals beyond the nominal shadowing, dB^2.
     excess_db2: f32,
+    /// Reports that the excess variance is averaged over.
     reports: f32,
 }
 
@@ -202,13 +205,13 @@ impl ChannelFit {
         self.update_excess(settings, residual, of_parameters + shadowing);
     }
 
-    /// The excess variance is the mean of the squared residuals beyond what was expected; single residuals count up to
-    /// the outlier limit.
+    /// Stochastic approximation of a robust variance: squared residuals are clipped at the present variance, so an outlier
+    /// counts no more than one standard deviation.
     fn update_excess(&mut self, settings: &FitSettings, residual: f32, expected: f32) {
         self.reports = (self.reports + 1.0).min(settings.variance_memory);
-        let most = settings.outlier * settings.outlier * (expected + self.excess_db2);
-        let excess = (residual * residual).min(most) - expected;
-        self.excess_db2 += (excess - self.excess_db2) / (self.reports + settings.variance_reports);
+        let variance = expected + self.excess_db2;
+        let clipped = (residual * residual).min(variance) / CLIPPED_NORMAL;
+        self.excess_db2 += (clipped - variance) / (self.reports + settings.variance_reports);
         self.excess_db2 = self.excess_db2.max(0.0);
     }
 }

@@ -43,11 +43,11 @@ mod tour;
 mod what_if;
 
 pub use channel::{ChannelModel, PathLoss};
-pub use decide::{Budget, Choice, Expected, LookAhead, Source, View};
+pub use decide::{Budget, Choice, Expected, LookAhead, Source, View, W_DATA_MAX};
 pub use fit::{ChannelFit, FitSettings};
 pub use links::Links;
-pub use model::{Model, Onboard, Transmission};
+pub use model::{EMPTY_UNITS, Model, Onboard, Transmission};
 pub use rates::Rates;
 pub use search::{Effort, Problem};
-pub use tour::{EMPTY_UNITS, STOPS_MAX, State, Stop, Tour};
+pub use tour::{STOPS_MAX, State, Stop, Tour};
 pub use what_if::{Outlook, Waypoint};

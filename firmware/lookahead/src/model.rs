@@ -1,12 +1,14 @@
 //! What a planner assumes about a mission.
 
 use crate::draw::Draw;
-use crate::tour::EMPTY_UNITS;
-use crate::{Links, Rates};
+use crate::links::Links;
+use crate::rates::Rates;
 use gleaner_guard::Guard;
 use gleaner_units::{Cell, Grid};
 use rand_core::Rng;
 
+/// A device that holds no more than this, data units, counts as empty: less than a thousandth of its initial load.
+pub const EMPTY_UNITS: f32 = 1.0;
 /// Candidate cells that are compared for each stop that the search draws.
 const CANDIDATES: usize = 3;
 /// The largest distance of such a cell from the device it is drawn for, cells along each axis.

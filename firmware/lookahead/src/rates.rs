@@ -47,7 +47,7 @@ impl Rates {
     /// Rebuilds the table if the channel has changed noticeably; returns whether it has.
     ///
     /// # Cost
-    /// About 7,000 exponentials and logarithms when it rebuilds.
+    /// About 25,000 exponentials and logarithms when it rebuilds.
     pub fn update(&mut self, channel: &ChannelModel, fit: &ChannelFit, grid: Grid, altitude: Metres) -> bool {
         let [near, far] = REBUILD_LOG10_M;
         let key = [
@@ -136,7 +136,7 @@ mod tests {
                 let mean_db = channel.mean_snr_db(line_of_sight, log10_m);
                 let expected = channel.expected_units_per_slot(mean_db, deviation_db);
                 let tabulated = f32::from(rates.units_per_slot(line_of_sight, squared_cells));
-                assert!((tabulated - expected).abs() <= 3.0, "{squared_cells}: {tabulated} {expected}");
+                assert!((tabulated - expected).abs() <= 5.0, "{squared_cells}: {tabulated} {expected}");
             }
         }
         assert_eq!(rates.units_per_slot(true, u32::MAX), 0);

@@ -1,8 +1,8 @@
 //! Simulated annealing over tours (Kirkpatrick, Gelatt and Vecchi 1983).
 
-use crate::Model;
 use crate::draw::Draw;
-use crate::tour::{EMPTY_UNITS, STOPS_MAX, State, Stop, Tour};
+use crate::model::{EMPTY_UNITS, Model};
+use crate::tour::{STOPS_MAX, State, Stop, Tour};
 use gleaner_units::Cell;
 use rand_core::Rng;
 
@@ -170,19 +170,19 @@ impl<M: Model, const D: usize> Problem<'_, M, D> {
         }
         let east_first = rng.coin();
         let [busy_max, device_max] = NEW_DWELL_MAX;
-        let mut stop = if rng.coin() {
+        let stop = if rng.coin() {
             let cell = self.model.draw_stop(&self.state.remaining, rng);
             Stop { cell, slots: rng.below(busy_max + 1) as u8, east_first }
         } else {
             let device = rng.below(devices.len());
-            let slots = rng.below(device_max + 1) as u8;
             let has_data = self.state.remaining.get(device).is_some_and(|&left| left > EMPTY_UNITS);
             let Some(&cell) = devices.get(device).filter(|_| has_data) else { return };
-            Stop { cell, slots, east_first }
+            let mut stop = Stop { cell, slots: rng.below(device_max + 1) as u8, east_first };
+            if rng.coin() {
+                self.nudge(&mut stop, rng);
+            }
+            stop
         };
-        if rng.below(4) == 0 {
-            self.nudge(&mut stop, rng);
-        }
         if self.model.moves_home(stop.cell).is_some() {
             tour.insert(rng.below(tour.stops.len() + 1), stop);
         }

@@ -1,11 +1,9 @@
 //! Tours, and the mean flight that evaluates them.
 
-use crate::{Model, Transmission};
+use crate::model::{Model, Transmission};
 use gleaner_units::{Action, BatteryUnits, Cell};
 use heapless::Vec;
 
-/// A device that holds no more than this, data units, counts as empty: less than a thousandth of its initial load.
-pub const EMPTY_UNITS: f32 = 1.0;
 /// The most stops of a tour.
 pub const STOPS_MAX: usize = 24;
 

@@ -9,10 +9,12 @@ use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::judge::evaluation::{
     Decider, Engine, Missions, Table, fly_all_as, fly_greedy, test_preferences,
 };
-use gleaner_host_trainer::judge::mismatch::Mismatch;
+use gleaner_host_trainer::judge::lookahead::LookingAhead;
+use gleaner_host_trainer::judge::mismatch::{MapError, Mismatch};
 use gleaner_host_trainer::judge::paper::Setting;
 use gleaner_host_trainer::planner::oracle::Thoroughness;
 use gleaner_host_trainer::planner::{DEVICES_MAX, Rates};
+use gleaner_lookahead::Budget;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{City, Realization, ScenarioKind, Seed, World};
 use std::fmt::Write as _;
@@ -51,6 +53,10 @@ pub struct Arguments {
     /// mission.
     #[arg(long, value_name = "PARTS", requires = "oracle")]
     bound: Option<u32>,
+    /// Also fly the model with look-ahead, with this many tours per decision; 1000 take one to two milliseconds. With
+    /// `--no-map` the network decides alone.
+    #[arg(long, value_name = "TOURS", requires = "model")]
+    lookahead: Option<u32>,
     /// Print one JSON object instead of tables.
     #[arg(long)]
     json: bool,
@@ -74,6 +80,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         let mut policy = model::load(path)?;
         let table = over(&places, |place| place.fly(&mut Engine(&mut policy)))?;
         systems.push((format!("{}", path.display()), table));
+        if let Some(tours) = arguments.lookahead {
+            let has_map = arguments.mismatch.mismatch().map != MapError::Flat;
+            let table = over(&places, |place| {
+                place.fly(&mut LookingAhead::new(&mut policy, Budget { tours }).with_map(has_map))
+            })?;
+            systems.push((format!("{} with look-ahead", path.display()), table));
+        }
     }
     let References { oracle, bound_percent } = references(arguments, &places)?;
     let summary = summary(&systems, oracle.as_ref(), bound_percent);

@@ -2,6 +2,7 @@
 
 pub mod evaluation;
 pub mod explanation;
+pub mod lookahead;
 pub mod mismatch;
 pub mod paper;
 pub mod pareto;

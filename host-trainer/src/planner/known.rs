@@ -1,15 +1,16 @@
-//! What there is to know about a mission: who is heard where, and how well.
+//! The model of a mission under the true channel: which device is received where, and how fast.
 
+use gleaner_lookahead::{EMPTY_UNITS, Model, Transmission};
 use gleaner_units::{Cell, Db, Grid};
 use gleaner_world::{Realization, World};
 use rand::{Rng, RngExt};
 use std::sync::Arc;
 
-/// Steps of the rate table, and its range: below nothing is carried, above nothing lies.
+/// The rate table over mean SNR: step, first value, length. No link lies outside it that carries data.
 const TABLE_STEP_DB: f32 = 0.25;
 const TABLE_FROM_DB: f32 = -20.0;
 const TABLE_LEN: usize = 240;
-/// Links that carry less than this in the mean, data units per slot, are left out.
+/// Links with a lower expected rate, data units per slot, are left out.
 const AUDIBLE_UNITS: f32 = 1.0;
 
 /// Expected data per slot of a link by its mean SNR, with and without line of sight.
@@ -20,7 +21,7 @@ pub struct Rates {
 }
 
 impl Rates {
-    /// Tabulates the channel.
+    /// Tabulates the channel of a world.
     #[must_use]
     pub fn new(world: Arc<World>) -> Rates {
         let tables = [false, true].map(|line_of_sight| {
@@ -52,7 +53,7 @@ impl Rates {
         self.world.city().grid()
     }
 
-    /// Everything about one mission, without fence and reserve.
+    /// The model of one mission, without fence and reserve.
     #[must_use]
     pub fn study(&self, realization: &Realization) -> Known {
         let grid = self.world.city().grid();
@@ -72,19 +73,19 @@ impl Rates {
             audible.extend(here.into_iter().map(|(_, link)| link));
             from.push(audible.len() as u32);
         }
-        let mut busyness = 0.0;
-        let busyness = from
+        let mut sum = 0.0;
+        let squared_rates = from
             .windows(2)
             .map(|ends| {
-                let heard: f32 =
+                let units: f32 =
                     audible[ends[0] as usize..ends[1] as usize].iter().map(|link| link.units).sum();
-                busyness += heard * heard;
-                busyness
+                sum += units * units;
+                sum
             })
             .collect();
         Known {
             grid,
-            busyness,
+            squared_rates,
             audible,
             from,
             terminal: realization.terminal(),
@@ -94,66 +95,75 @@ impl Rates {
     }
 }
 
-/// A device that is heard at a cell.
+/// A device that is received over a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Audible {
     /// Its index.
     pub device: u8,
-    /// What a slot carries from it in the mean.
+    /// Expected data units per slot.
     pub units: f32,
 }
 
-/// One mission with nothing hidden but the chance of each slot.
+/// A mission whose only unknown is the shadowing of each slot.
 #[derive(Clone, Debug)]
 pub struct Known {
     grid: Grid,
     audible: Vec<Audible>,
-    /// Where the cell's part of `audible` begins; one more entry than cells.
+    /// By cell: the start of its part of `audible`; one more entry than cells.
     from: Vec<u32>,
-    /// Up to and with each cell, the sum of the squares of what is heard there from all devices together.
-    busyness: Vec<f32>,
+    /// By cell: the sum over all cells up to it of the squared total rate of all devices.
+    squared_rates: Vec<f32>,
     terminal: Cell,
     devices: Vec<Cell>,
     initial_units: f32,
 }
 
 impl Known {
-    /// The grid of the city.
-    #[must_use]
-    pub const fn grid(&self) -> Grid {
-        self.grid
-    }
-
-    /// The cell that ends the mission.
-    #[must_use]
-    pub const fn terminal(&self) -> Cell {
-        self.terminal
-    }
-
-    /// Where the devices are.
-    #[must_use]
-    pub fn devices(&self) -> &[Cell] {
-        &self.devices
-    }
-
-    /// What all devices held at the start.
-    #[must_use]
-    pub const fn initial_units(&self) -> f32 {
-        self.initial_units
-    }
-
-    /// A random cell, the likelier the more is heard there: good tours hover where several devices are in sight.
-    pub fn busy_cell(&self, rng: &mut impl Rng) -> Cell {
-        let most = self.busyness.last().copied().unwrap_or(0.0);
-        let drawn = rng.random::<f32>() * most;
-        let place = self.busyness.partition_point(|&sum| sum <= drawn);
-        self.grid.cell_at(place).unwrap_or(self.terminal)
-    }
-
-    /// The devices that are heard at a cell, the best in the mean first.
+    /// The devices that are received over a cell, highest mean SNR first.
     #[must_use]
     pub fn audible(&self, cell: Cell) -> &[Audible] {
         let Some(place) = self.grid.index(cell) else { return &[] };
         &self.audible[self.from[place] as usize..self.from[place + 1] as usize]
+    }
+}
+
+impl Model for Known {
+    fn grid(&self) -> Grid {
+        self.grid
+    }
+
+    fn terminal(&self) -> Cell {
+        self.terminal
+    }
+
+    fn moves_home(&self, cell: Cell) -> Option<u16> {
+        self.grid.contains(cell).then(|| cell.manhattan(self.terminal) as u16)
+    }
+
+    fn reserve_hovers(&self) -> i32 {
+        0
+    }
+
+    fn devices(&self) -> &[Cell] {
+        &self.devices
+    }
+
+    fn initial_units(&self) -> f32 {
+        self.initial_units
+    }
+
+    fn transmission(&self, cell: Cell, remaining: &[f32]) -> Option<Transmission> {
+        let has_data = |link: &&Audible| remaining[usize::from(link.device)] > EMPTY_UNITS;
+        let link = self.audible(cell).iter().find(has_data)?;
+        Some(Transmission { device: usize::from(link.device), units: link.units })
+    }
+
+    /// A random cell with a probability proportional to its squared total rate: good tours hover where several devices are
+    /// in sight.
+    fn draw_stop(&self, _remaining: &[f32], rng: &mut impl Rng) -> Cell {
+        let total = self.squared_rates.last().copied().unwrap_or(0.0);
+        let drawn = rng.random::<f32>() * total;
+        let place = self.squared_rates.partition_point(|&sum| sum <= drawn);
+        self.grid.cell_at(place).unwrap_or(self.terminal)
     }
 }

@@ -3,14 +3,12 @@
 
 use crate::env::flight::Reward;
 use crate::judge::evaluation::{Missions, test_preferences};
-use crate::planner::{Effort, Problem, Rates, State, Tour};
+use crate::planner::{Effort, Problem, Rates, Tour, W_DATA_MAX, initial_state};
+use gleaner_lookahead::Model;
 use gleaner_world::Realization;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-
-/// The largest weight of data that is planned with: of tours that bring the same, the shorter one is the better.
-const THRIFT: f32 = 0.99;
 
 /// The oracle in one setting: a line of the file that `gleaner-train oracle` writes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,13 +65,14 @@ pub struct Thoroughness {
 #[must_use]
 pub fn consult(rates: &Rates, realization: &Realization, thoroughness: Thoroughness) -> Vec<Reward> {
     let known = rates.study(realization);
-    let state = State::start(realization);
+    let state = initial_state(realization);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut tour = Tour::default();
     test_preferences()
         .iter()
         .map(|preference| {
-            let problem = Problem { known: &known, state: &state, w_data: preference.w_data().min(THRIFT) };
+            let problem =
+                Problem { model: &known, state: &state, w_data: preference.w_data().min(W_DATA_MAX) };
             let anew = Effort { tours: thoroughness.tours, temperatures: [5.0, 0.03] };
             let onward = Effort { tours: thoroughness.tours, temperatures: [1.5, 0.03] };
             let first = problem.anneal(Tour::default(), anew, &mut rng);

@@ -7,7 +7,7 @@ use crate::learn::ppo::settings::PpoSettings;
 use crate::learn::trainer::TrainError;
 use crate::net::Sample;
 use crate::observe::tokens;
-use crate::planner::{Prospect, Rates, THRIFT};
+use crate::planner::{Prospect, Rates, W_DATA_MAX};
 use crate::settings::Settings;
 use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
@@ -142,7 +142,7 @@ impl RolloutFlight {
     pub fn step(&mut self, action: Action) -> f32 {
         self.actions.push(action.index() as u8);
         let [data, energy] = self.flight.step(action);
-        let w_data = self.flight.preference().w_data().min(THRIFT);
+        let w_data = self.flight.preference().w_data().min(W_DATA_MAX);
         self.planner_value = self.prospect.value(&self.flight);
         w_data * data + (1.0 - w_data) * energy
     }

@@ -20,7 +20,7 @@
 //! data <= m B + sum_k (1 - p_k) D_k - cost of the cheapest path
 //! ```
 //!
-//! A subgradient method minimises the right-hand side over the multipliers (`relaxation`).
+//! A subgradient method minimises the right-hand side over the multipliers (`relaxation`, `multipliers`).
 //!
 //! # Branching
 //! The relaxation values hovering as if it always happened at the best cell of the map, so the bound of the root node is
@@ -30,6 +30,7 @@
 //! cheapest path over cells and sets of visited devices (Held and Karp 1962; `paths`). The node with the highest bound is
 //! split until the node limit is reached. The highest bound of the open nodes holds for all missions.
 
+mod multipliers;
 mod node;
 mod paths;
 mod relaxation;

@@ -1,7 +1,7 @@
 //! Nodes of the branch-and-bound tree.
 
 use super::Mission;
-use super::relaxation::Multipliers;
+use super::multipliers::Multipliers;
 use std::cmp::Ordering;
 
 /// Below this rate, data units per slot, a device counts as not received when nodes are split.

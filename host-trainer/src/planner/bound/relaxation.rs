@@ -1,6 +1,7 @@
 //! The Lagrangian relaxation of a node, minimised over its multipliers by a subgradient method.
 
 use super::Mission;
+use super::multipliers::{Multipliers, ROUNDING, Subgradient};
 use super::node::Node;
 use super::paths::{Paths, Region};
 
@@ -10,27 +11,6 @@ const ROUNDS: u32 = 6;
 const TARGET_SHARE: f64 = 0.97;
 /// The step length is divided by `1 + STEP_DECAY * round`.
 const STEP_DECAY: f64 = 0.1;
-/// Initial battery multiplier, data units per battery unit. It also scales the battery's component of the subgradient.
-const BATTERY_MULTIPLIER: f64 = 300.0;
-/// Range of the battery multiplier. No battery unit collects as much data as the maximum.
-const BATTERY_MULTIPLIER_RANGE: [f64; 2] = [1.0, 2_000.0];
-/// Relative slack that keeps rounding errors from making a bound too low.
-const ROUNDING: f64 = 1e-9;
-
-/// The multipliers of the relaxed constraints.
-#[derive(Clone)]
-pub(super) struct Multipliers {
-    /// Of the battery constraint, data units per battery unit.
-    battery: f64,
-    /// Of each device's data constraint, as a share of the largest value at which hovering does not pay.
-    data: Vec<f64>,
-}
-
-impl Multipliers {
-    pub fn initial(devices: usize) -> Multipliers {
-        Multipliers { battery: BATTERY_MULTIPLIER, data: vec![1.0; devices] }
-    }
-}
 
 /// The solution of the relaxed problem.
 struct Walk {
@@ -40,12 +20,6 @@ struct Walk {
     received: Vec<f64>,
     /// By device, what it sends on the walk if its data is unlimited, data units.
     sent: Vec<f64>,
-}
-
-/// A subgradient of the bound, in the parameters of [`Multipliers`].
-struct Subgradient {
-    battery: f64,
-    data: Vec<f64>,
 }
 
 impl Mission {
@@ -166,20 +140,6 @@ impl Mission {
             }
         }
         Some(walk)
-    }
-}
-
-impl Multipliers {
-    /// Moves against the subgradient by the length that would close `gap` if the bound were linear.
-    fn step(&mut self, slope: &Subgradient, gap: f64) {
-        let scaled = BATTERY_MULTIPLIER * slope.battery;
-        let norm2 = scaled.powi(2) + slope.data.iter().map(|slope| slope * slope).sum::<f64>();
-        let step = gap / norm2.max(ROUNDING);
-        let [low, high] = BATTERY_MULTIPLIER_RANGE;
-        self.battery = (self.battery - step * scaled * BATTERY_MULTIPLIER).clamp(low, high);
-        for (share, slope) in self.data.iter_mut().zip(&slope.data) {
-            *share = (*share - step * slope).clamp(0.0, 1.0);
-        }
     }
 }
 

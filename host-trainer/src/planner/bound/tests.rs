@@ -1,6 +1,6 @@
 use super::*;
 use crate::judge::evaluation::realizations;
-use crate::planner::{Effort, Problem, State, Tour};
+use crate::planner::{Effort, Problem, Tour, initial_state};
 use gleaner_world::{ScenarioKind, World};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -85,8 +85,8 @@ fn bound_is_above_the_oracle_and_below_all_data() {
     let bounds: Vec<f32> = drawn
         .iter()
         .map(|(_, realization)| {
-            let (known, state) = (rates.study(realization), State::start(realization));
-            let problem = Problem { known: &known, state: &state, w_data: 1.0 };
+            let (known, state) = (rates.study(realization), initial_state(realization));
+            let problem = Problem { model: &known, state: &state, w_data: 1.0 };
             let effort = Effort { tours: 2_000, temperatures: [5.0, 0.03] };
             let (reached, _) = problem.anneal(Tour::default(), effort, &mut ChaCha8Rng::seed_from_u64(0));
             let bound = upper_bound_percent(&rates, realization, reached, 200);

@@ -1,0 +1,90 @@
+//! The look-ahead that flies, as a decider.
+
+use crate::env::flight::Flight;
+use crate::judge::evaluation::{Decider, DeciderError};
+use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, Source, View};
+use gleaner_policy::{DeviceState, K_MAX, Policy};
+use gleaner_units::{Action, Sight};
+
+/// Decisions by [`Source`]: network, kept plan, device order, single move.
+pub type SourceCounts = [u64; 4];
+
+/// A policy with look-ahead. It has what the aircraft has: the map, the nominal channel, live SNR, positions and data.
+pub struct LookingAhead<'a, P> {
+    policy: &'a mut P,
+    budget: Budget,
+    settings: FitSettings,
+    has_map: bool,
+    flights: Vec<LookAhead<K_MAX>>,
+    sources: SourceCounts,
+}
+
+impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
+    /// Looks ahead with this budget per decision.
+    #[must_use]
+    pub fn new(policy: &'a mut P, budget: Budget) -> LookingAhead<'a, P> {
+        let settings = FitSettings::DEFAULT;
+        LookingAhead { policy, budget, settings, has_map: true, flights: Vec::new(), sources: [0; 4] }
+    }
+
+    /// Says whether there is a map of buildings on board; without one the policy decides alone.
+    #[must_use]
+    pub const fn with_map(mut self, has_map: bool) -> LookingAhead<'a, P> {
+        self.has_map = has_map;
+        self
+    }
+
+    /// Changes the constants of the channel fit.
+    #[must_use]
+    pub const fn with_settings(mut self, settings: FitSettings) -> LookingAhead<'a, P> {
+        self.settings = settings;
+        self
+    }
+
+    /// How many decisions came from each source.
+    #[must_use]
+    pub const fn sources(&self) -> SourceCounts {
+        self.sources
+    }
+
+    fn decide_one(&mut self, number: usize, flight: &Flight) -> Result<Action, DeciderError> {
+        let answer = self.policy.infer(&flight.tokens()).map_err(|error| DeciderError(error.to_string()))?;
+        let devices: Vec<DeviceState> = flight.device_states().collect();
+        while self.flights.len() <= number {
+            self.flights.push(LookAhead::new(ChannelModel::NOMINAL, self.settings));
+        }
+        let lookahead = &mut self.flights[number];
+        if flight.episode().slots() == 0 {
+            let map = self.has_map.then(|| flight.map() as &dyn Sight);
+            lookahead.begin(map, &devices, 0);
+        }
+        let view = View {
+            cell: flight.episode().uav(),
+            battery: flight.episode().battery(),
+            preference: flight.preference(),
+            guard: flight.guard(),
+            devices: &devices,
+        };
+        let choice = lookahead
+            .propose(&view, &answer.logits, flight.mask(), self.budget)
+            .ok_or_else(|| DeciderError("no action is allowed".into()))?;
+        let source = match choice.source {
+            Source::Network => 0,
+            Source::KeptPlan => 1,
+            Source::DeviceOrder => 2,
+            Source::SingleMove => 3,
+        };
+        self.sources[source] += 1;
+        Ok(choice.action)
+    }
+}
+
+impl<P: Policy<Error: std::fmt::Display>> Decider for LookingAhead<'_, P> {
+    fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError> {
+        flights.iter().enumerate().map(|(number, flight)| self.decide_one(number, flight)).collect()
+    }
+
+    fn decide_numbered(&mut self, flights: &[(usize, &Flight)]) -> Result<Vec<Action>, DeciderError> {
+        flights.iter().map(|(number, flight)| self.decide_one(*number, flight)).collect()
+    }
+}
