@@ -4,8 +4,8 @@
 //! `cargo test --release --workspace --test board -- --nocapture`.
 
 use gleaner_harness::{
-    Ending, Flight, Flown, Incident, IncidentKind, MissionPlan, Pace, Slot, Staged, Switch, Wired, Wishes,
-    fly_wired,
+    AircraftFault, Ending, FlightResult, FlightRun, FlightScript, Incident, IncidentKind, MissionPlan,
+    MissionSetup, Pace, Slot, Switch, Wired, fly_wired,
 };
 use gleaner_pilot::State;
 use gleaner_policy::native::{AlignedBytes, Model, NativePolicy, Workspace};
@@ -29,13 +29,13 @@ const ENGAGE: u16 = 31011;
 /// Aircraft seconds per second of board time. At 6 the board misses deadlines on a busy machine.
 const HASTE: f32 = 4.0;
 
-fn staged(kind: ScenarioKind, seed: u64, devices: usize, haste: f32) -> Staged {
-    let plan = MissionPlan { devices: Some(devices), haste, ..MissionPlan::new(kind, seed) };
-    Staged::new(Arc::new(World::default_world()), plan).unwrap()
+fn staged(kind: ScenarioKind, seed: u64, devices: usize, speedup: f32) -> MissionSetup {
+    let plan = MissionPlan { devices: Some(devices), speedup, ..MissionPlan::new(kind, seed) };
+    MissionSetup::new(Arc::new(World::default_world()), plan).unwrap()
 }
 
 /// RB for energy alone: two decisions, twenty seconds.
-fn out_and_back() -> Staged {
+fn out_and_back() -> MissionSetup {
     staged(ScenarioKind::ReturnBase, 5, 6, HASTE)
 }
 
@@ -52,26 +52,26 @@ fn boot(image: &Image, options: &Options<'_>) -> Board {
     Board::boot(image, options).unwrap_or_else(|cause| panic!("{cause:#}"))
 }
 
-fn flight(staged: Staged, wishes: Wishes) -> Flight {
-    Flight::new(staged, wishes, PILOT).unwrap()
+fn flight(staged: MissionSetup, script: FlightScript) -> FlightRun {
+    FlightRun::new(staged, script, PILOT).unwrap()
 }
 
 fn after(seconds: u64) -> Duration {
     Duration::from_secs(seconds)
 }
 
-fn said(flown: &Flown, part: &str) -> bool {
+fn said(flown: &FlightResult, part: &str) -> bool {
     flown.texts.iter().any(|(_, text)| text.contains(part))
 }
 
-fn assert_good(flown: &Flown) {
+fn assert_good(flown: &FlightResult) {
     let figures = flown.figures();
     assert_eq!(flown.ending, Ending::OnTheGround, "waited for {}: {:?}", flown.waiting_for, flown.texts);
     assert!(figures.is_good(), "{:?} {:?}", figures.violations, flown.texts);
 }
 
 /// The pilot's frames after this time.
-fn since(flown: &Flown, message_id: u32, at: Instant) -> Vec<Heard> {
+fn since(flown: &FlightResult, message_id: u32, at: Instant) -> Vec<Heard> {
     let mut frames = heard(flown.simulation.journal(), PILOT, message_id);
     frames.retain(|heard| heard.at > at);
     frames
@@ -91,10 +91,10 @@ impl Judge {
     }
 
     /// Repeats every decision of the flight from the radio's reports and the pilot's records; returns how many.
-    fn judge(&mut self, flown: &Flown) -> usize {
+    fn judge(&mut self, flown: &FlightResult) -> usize {
         let mut workspace = Workspace::new();
         let mut native = NativePolicy::new(Model::read(self.blob.as_slice()).unwrap(), &mut workspace);
-        let staged = flown.simulation.staged();
+        let staged = flown.simulation.setup();
         let guard = staged.mission.guard(staged.plan.reserve).unwrap();
         let mut judged = 0;
         for slot in flown.simulation.journal().slots() {
@@ -127,8 +127,8 @@ fn the_board_flies_the_mission_with_linux_decisions() {
     let mut board = boot(&image, &Options::default());
     // The first change is a command, the second a parameter.
     let switches = vec![Switch { after: after(40), w_data: 0.5 }, Switch { after: after(80), w_data: 0.1 }];
-    let wishes = Wishes { switches, ..Wishes::plain(1.0) };
-    let flown = fly_wired(flight(staged, wishes), &mut board.wired, |_, _| None);
+    let script = FlightScript { switches, ..FlightScript::plain(1.0) };
+    let flown = fly_wired(flight(staged, script), &mut board.wired, |_, _| None);
     assert_good(&flown);
     let figures = flown.figures();
     assert_eq!(figures.switches, 2, "{:?}", flown.texts);
@@ -163,7 +163,7 @@ fn garbage_partial_frames_and_a_flood_do_no_harm() {
     let mut noise = Noise(7);
     // Half a frame of the autopilot: a heartbeat that ends after its sixth byte of payload.
     let half = [0xFD, 9, 0, 0, 1, 1, 1, 0, 0, 0, 4, 0, 0, 0, 2, 3];
-    let disturb = |flight: &Flight, wired: &mut Wired| {
+    let disturb = |flight: &FlightRun, wired: &mut Wired| {
         let mut bytes = [0; 256];
         noise.fill(&mut bytes);
         match flight.operator().engaged_at() {
@@ -176,7 +176,7 @@ fn garbage_partial_frames_and_a_flood_do_no_harm() {
         }
         None
     };
-    let flown = fly_wired(flight(staged, Wishes::plain(0.0)), &mut board.wired, disturb);
+    let flown = fly_wired(flight(staged, FlightScript::plain(0.0)), &mut board.wired, disturb);
     assert_good(&flown);
     assert_eq!(Judge::new(&image).judge(&flown), 2);
     let heartbeats = heard(flown.simulation.journal(), PILOT, HEARTBEAT);
@@ -189,9 +189,9 @@ fn an_autopilot_that_reboots_gets_no_more_targets() {
     let staged = out_and_back();
     let image = image().with_mission(&staged.mission).unwrap();
     let mut board = boot(&image, &Options::default());
-    let incidents = vec![Incident { after: after(2), kind: IncidentKind::AutopilotReboots }];
-    let wishes = Wishes { incidents, ..Wishes::plain(0.0) };
-    let mut flight = flight(staged, wishes);
+    let incidents = vec![Incident { after: after(2), kind: IncidentKind::Aircraft(AircraftFault::Reboot) }];
+    let script = FlightScript { incidents, ..FlightScript::plain(0.0) };
+    let mut flight = flight(staged, script);
     let mut pace = Pace::new(HASTE);
     let mut rebooted_at = None;
     // After the landing the pilot is watched until the autopilot has been back for a while.
@@ -222,7 +222,7 @@ fn a_reset_in_flight_silences_the_board_and_does_not_engage() {
     let (mut hung_at, mut reset_at) = (None, None);
     // The operator repeats the engage request until the first decision. The program hangs later than that, so that no
     // request is left on the line.
-    let flown = fly_wired(flight(staged, Wishes::plain(1.0)), &mut wired, |flight, _| {
+    let flown = fly_wired(flight(staged, FlightScript::plain(1.0)), &mut wired, |flight, _| {
         let now = flight.simulation().now();
         let engaged_at = flight.operator().engaged_at()?;
         if hung_at.is_none() && now > engaged_at + board_seconds(3) {
@@ -249,10 +249,10 @@ fn a_reset_in_flight_silences_the_board_and_does_not_engage() {
 }
 
 /// Boots an image that must not fly, and requests engaging for ten seconds of board time.
-fn refused(image: &Image, staged: Staged) -> Flown {
+fn refused(image: &Image, staged: MissionSetup) -> FlightResult {
     let mut board = boot(image, &Options::default());
     let mut asked_at = None;
-    let flown = fly_wired(flight(staged, Wishes::plain(0.0)), &mut board.wired, |flight, _| {
+    let flown = fly_wired(flight(staged, FlightScript::plain(0.0)), &mut board.wired, |flight, _| {
         let now = flight.simulation().now();
         if flight.operator().waiting_for() == "the first decision" {
             asked_at.get_or_insert(now);
@@ -296,7 +296,7 @@ fn damaged_parameters_fall_back_to_the_defaults() {
     let mut noise = vec![0; image.parameters().unwrap().len()];
     Noise(11).fill(&mut noise);
     let mut board = boot(&image, &Options { parameters: Some(&noise), ..Options::default() });
-    let flown = fly_wired(flight(staged, Wishes::plain(0.0)), &mut board.wired, |_, _| None);
+    let flown = fly_wired(flight(staged, FlightScript::plain(0.0)), &mut board.wired, |_, _| None);
     assert_good(&flown);
     assert!(said(&flown, "parameters damaged, defaults hold"), "{:?}", flown.texts);
     assert_eq!(Judge::new(&image).judge(&flown), 2);

@@ -3,7 +3,7 @@
 //!
 //! `cargo test --release --workspace --test budget -- --nocapture`
 
-use gleaner_harness::{Ending, Flight, MissionPlan, Staged, Wishes, fly_wired};
+use gleaner_harness::{Ending, FlightRun, FlightScript, MissionPlan, MissionSetup, fly_wired};
 use gleaner_tests::board::{Board, Image, Options, StackUse, named_values};
 use gleaner_world::{ScenarioKind, World};
 use serde::Deserialize;
@@ -53,12 +53,12 @@ impl Line {
 /// inference.
 fn fly(image: &Image) -> (StackUse, u64) {
     let kind = ScenarioKind::ReturnBase;
-    let plan = MissionPlan { devices: Some(12), haste: 4.0, ..MissionPlan::new(kind, 5) };
-    let staged = Staged::new(Arc::new(World::default_world()), plan).unwrap();
+    let plan = MissionPlan { devices: Some(12), speedup: 4.0, ..MissionPlan::new(kind, 5) };
+    let staged = MissionSetup::new(Arc::new(World::default_world()), plan).unwrap();
     let image = image.with_mission(&staged.mission).unwrap();
     let options = Options { count_instructions: true, ..Options::default() };
     let mut board = Board::boot(&image, &options).unwrap_or_else(|cause| panic!("{cause:#}"));
-    let flight = Flight::new(staged, Wishes::plain(0.0), 191).unwrap();
+    let flight = FlightRun::new(staged, FlightScript::plain(0.0), 191).unwrap();
     let flown = fly_wired(flight, &mut board.wired, |_, _| None);
     assert_eq!(flown.ending, Ending::OnTheGround, "waited for {}: {:?}", flown.waiting_for, flown.texts);
     let times_us = named_values(flown.simulation.journal(), 191, "infer_us");

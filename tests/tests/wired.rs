@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// An RB mission at w = 0 has two decisions; at ten times real time it takes 15 s.
-const QUICK: [&str; 8] = ["--scenario", "rb", "--seed", "5", "--preference", "0", "--haste", "8"];
+const QUICK: [&str; 8] = ["--scenario", "rb", "--seed", "5", "--preference", "0", "--speedup", "8"];
 
 struct Flight {
     report: Value,

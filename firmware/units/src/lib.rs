@@ -23,11 +23,13 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)
 )]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 mod action;
 mod cells;
+#[cfg(feature = "std")]
+pub mod city_file;
 mod decimal;
 mod frame;
 mod grid;

@@ -1,4 +1,4 @@
-//! What happened: the track, the slots, the frames; and their files.
+//! The record of a flight: track, slots, frames, and their files.
 
 use crate::autopilot::Truth;
 use gleaner_pilot::{DecisionRecord, LoggedDecision, Mission, SimulatedSlot};
@@ -7,29 +7,29 @@ use gleaner_units::{Duration, Instant, Ned, Rays};
 use gleaner_world::{City, Serving};
 use std::io::{self, Write};
 
-/// One decision that passed by on the wire.
+/// One decision on the line, with the simulation's state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Slot {
     /// When, since the autopilot's boot.
     pub at: Instant,
-    /// Where the aircraft really was.
+    /// True position.
     pub position: Ned,
-    /// What the pilot said.
+    /// The pilot's record.
     pub record: DecisionRecord,
     /// The devices as the radio reported them for this slot, in the mission's order.
     pub heard: Vec<DeviceState>,
     /// Whether it was flown: shadow decisions are not.
     pub flown: bool,
-    /// What the slot brought.
+    /// The device served and its data.
     pub serving: Option<Serving>,
     /// Fraction of the data collected so far.
     pub collected: f32,
 }
 
 impl Slot {
-    /// The observation that the pilot must have had: what it says of cell, battery and preference, what the radio
-    /// reported, and the mission, flown at the altitude of the simulated city. `None` if its preference is
-    /// impossible. So a decision that was made elsewhere can be made again here, and no pilot is asked what it saw.
+    /// The observation behind the decision: cell, battery and preference of the record, the radio's reports, and the
+    /// mission at the altitude of the simulated city. `None` if the record's preference is impossible. With it a
+    /// decision that was made on a board can be repeated here.
     #[must_use]
     pub fn observation(&self, mission: &Mission) -> Option<(Tokens, Slots)> {
         let sight = Rays { heights: &mission.heights, altitude_m: City::ALTITUDE_M };
@@ -54,7 +54,7 @@ pub struct TrackPoint {
     pub position: Ned,
 }
 
-/// Everything that is kept of a flight.
+/// The record of a flight.
 #[derive(Clone, Debug, Default)]
 pub struct Journal {
     track: Vec<TrackPoint>,
@@ -69,7 +69,7 @@ const LOG_EPOCH_S: u64 = 1_767_225_600;
 impl Journal {
     const TRACK_INTERVAL: Duration = Duration::from_millis(200);
 
-    pub(crate) fn see(&mut self, now: Instant, truth: &Truth) {
+    pub(crate) fn track_point(&mut self, now: Instant, truth: &Truth) {
         if now >= self.next_point {
             self.next_point = now + Journal::TRACK_INTERVAL;
             self.track.push(TrackPoint { at: now, position: truth.position });

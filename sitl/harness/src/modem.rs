@@ -1,14 +1,13 @@
-//! The devices on the ground, and the radio modem on board that reports how it hears them.
+//! The devices on the ground, and the radio modem on board that reports their signals.
 //!
-//! # One process with the trainer
-//! The channel is drawn once per *slot*, as in the paper and in [`gleaner_world::Episode`], and not by time: a slot
-//! begins with a decision, serves one device at the present cell with the SNR that was reported there, and then
-//! every device is heard anew at the cell that the aircraft is sent to. So a flight through all this machinery collects
-//! exactly what an episode of the same seed and the same actions collects; a test says so.
+//! # The same process as in training
+//! The channel is drawn once per *slot*, as in the paper and in [`gleaner_world::Episode`], not by time. A slot begins
+//! with a decision and serves one device at the present cell with the SNR that was reported there. Then the links of
+//! all devices are drawn for the cell that the aircraft is sent to. A flight therefore collects exactly what an episode
+//! of the same seed and the same actions collects; a test compares the two.
 //!
-//! The reports of the next cell go out as soon as the slot is decided, while the aircraft is still on its way. That
-//! gives nothing away: between here and there nothing is decided, the next decision is made on arrival, and what the
-//! modem says of that cell is then simply up to date.
+//! The reports for the next cell go out as soon as the slot is decided, while the aircraft is still on its way. No
+//! decision is made between the two cells, so the pilot gains nothing from the early reports.
 
 use gleaner_radio::Report;
 use gleaner_units::{Action, Cell, Duration, Instant};
@@ -19,25 +18,27 @@ use std::sync::Arc;
 /// Time between two rounds of reports, on the pilot's clock.
 const ROUND: Duration = Duration::from_millis(200);
 
-/// The modem and the devices that it hears.
+/// The modem and the devices in its range.
 #[derive(Clone, Debug)]
 pub struct Modem {
     world: Arc<World>,
     field: Field,
     rng: ChaCha8Rng,
+    /// Device ids in the reports, by index.
+    ids: Vec<u32>,
     cell: Cell,
     round: Duration,
     next_round: Instant,
 }
 
-/// The id in the reports of the device with this index.
+/// The id of the device with this index in a mission that was drawn.
 #[must_use]
 pub fn device_id(index: usize) -> u32 {
     index as u32 + 1
 }
 
 impl Modem {
-    /// A modem at the start of a realization. `seed` names the shadowing.
+    /// A modem at the start of a realization. `seed` is that of the shadowing.
     ///
     /// # Errors
     /// The realization belongs to another city.
@@ -46,13 +47,20 @@ impl Modem {
         let mut rng = seed.rng(Stream::Slots);
         field.listen(&world, realization.start(), &mut rng);
         let cell = realization.start();
-        Ok(Modem { world, field, rng, cell, round: ROUND, next_round: Instant::ZERO })
+        let ids = (0..field.devices().len()).map(device_id).collect();
+        Ok(Modem { world, field, rng, ids, cell, round: ROUND, next_round: Instant::ZERO })
     }
 
-    /// The same for a pilot whose clock counts one second while `haste` seconds pass here.
+    /// The same with the device ids of a mission file.
     #[must_use]
-    pub fn with_haste(self, haste: f32) -> Modem {
-        Modem { round: Duration::from_secs_f32(ROUND.as_secs_f32() * haste), ..self }
+    pub fn with_ids(self, ids: Vec<u32>) -> Modem {
+        Modem { ids, ..self }
+    }
+
+    /// The same for a pilot whose clock counts one second while `speedup` seconds pass here.
+    #[must_use]
+    pub fn with_speedup(self, speedup: f32) -> Modem {
+        Modem { round: Duration::from_secs_f32(ROUND.as_secs_f32() * speedup), ..self }
     }
 
     /// One slot: serves at `cell`, then hears the devices at the cell that `action` leads to. Reports follow at once.
@@ -65,7 +73,7 @@ impl Modem {
         serving
     }
 
-    /// The aircraft is over `cell` without having decided so: carried there by its pilot.
+    /// Somebody else flies the aircraft over `cell`.
     pub fn carry_to(&mut self, cell: Cell) {
         if self.cell != cell {
             self.cell = cell;
@@ -74,7 +82,7 @@ impl Modem {
         }
     }
 
-    /// The reports that are due: all devices that are heard at all, at 5 Hz.
+    /// The reports that are due, at 5 Hz: one for every device whose link is known.
     pub fn reports(&mut self, now: Instant) -> Vec<Report> {
         if now < self.next_round {
             return Vec::new();
@@ -82,12 +90,12 @@ impl Modem {
         self.next_round = now + self.round;
         let heard = self.field.devices().iter().enumerate().filter(|(_, device)| device.snr.0.is_finite());
         let report = |(index, device): (usize, &Device)| Report {
-            device: device_id(index),
+            device: self.ids.get(index).copied().unwrap_or_default(),
             snr: device.snr,
             remaining: Some(device.remaining_units),
             age_ms: 0,
         };
-        // Outside the city nothing is heard.
+        // Outside the city no link is known.
         heard.map(report).collect()
     }
 
@@ -111,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn slots_are_those_of_an_episode() {
+    fn slots_equal_those_of_an_episode() {
         let (world, realization) = setup();
         let mut modem = Modem::new(Arc::clone(&world), &realization, Seed::evaluation(3)).unwrap();
         let mut episode = Episode::new(world, &realization, Seed::evaluation(3)).unwrap();
@@ -125,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn reports_carry_what_is_heard_at_5_hz_and_at_once_after_a_slot() {
+    fn reports_come_at_5_hz_and_at_once_after_a_slot() {
         let (world, realization) = setup();
         let mut modem = Modem::new(world, &realization, Seed::evaluation(3)).unwrap();
         let reports = modem.reports(Instant::from_millis(20));

@@ -1,17 +1,21 @@
-//! The scripted operator: a ground station that flies a mission by the book, through MAVLink bytes only.
+//! The scripted operator: a ground station that prepares a mission as an operator does, through MAVLink bytes only.
 //!
 //! ```text
-//! Peers -> Configure -> Ready -> Guided -> Arm -> TakeOff -> Climb -> Engage -> Flying -> Over
+//! ArduPilot: Peers -> Configure -> Ready -> Guided -> Arm -> TakeOff -> Climb -> Engage -> Flying -> Over
+//! PX4:       Peers -> Configure -> Ready -> Arm -> TakeOff -> Climb -> Engage -> Offboard -> Flying -> Over
 //! ```
-//! Everything asked is asked again every second until it is answered.
+//! PX4 accepts OFFBOARD in the air only when targets already stream: the request to engage starts the stream, then
+//! the operator selects OFFBOARD. Every request is repeated each second until it is answered.
 
+use crate::autopilot::{AutopilotKind, VehicleMode};
 use crate::wire::{Speaker, parse};
 use gleaner_link::{Address, Frame, FrameDecoder, Message, TUNNEL_DECISION};
 use gleaner_pilot::{DecisionRecord, State};
 use gleaner_units::{Duration, Instant};
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_LONG_DATA, EKF_STATUS_REPORT_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot,
-    MavCmd, MavModeFlag, MavParamType, MavState, MavType, PARAM_SET_DATA, PARAM_VALUE_DATA,
+    COMMAND_LONG_DATA, EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA, GLOBAL_POSITION_INT_DATA,
+    HEARTBEAT_DATA, HOME_POSITION_DATA, MavAutopilot, MavCmd, MavModeFlag, MavParamType, MavState, MavType,
+    PARAM_SET_DATA, PARAM_VALUE_DATA,
 };
 
 /// A change of the preference in flight.
@@ -23,7 +27,7 @@ pub struct Switch {
     pub w_data: f32,
 }
 
-/// What the operator is to do.
+/// The operator's instructions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orders {
     /// System id of the ground station.
@@ -32,11 +36,13 @@ pub struct Orders {
     pub system_id: u8,
     /// The pilot's component id.
     pub component_id: u8,
+    /// Which autopilot the vehicle has.
+    pub autopilot: AutopilotKind,
     /// The pilot's parameters to set, by name.
     pub parameters: Vec<(&'static str, f32)>,
     /// Climb to this height, m.
     pub altitude_m: f32,
-    /// Engage the pilot after the climb; otherwise leave it to somebody else.
+    /// Engage the pilot after the climb; otherwise stop there.
     pub engage: bool,
     /// Changes of the preference, in order of time. They go out as `MAV_CMD_USER_1` and as `PARAM_SET` in turn.
     pub switches: Vec<Switch>,
@@ -52,6 +58,7 @@ enum Step {
     TakeOff,
     Climb,
     Engage,
+    Offboard,
     Flying,
     Over,
 }
@@ -59,12 +66,14 @@ enum Step {
 /// `MAV_COMP_ID_MISSIONPLANNER`, the component of most ground stations.
 const COMPONENT: u8 = 190;
 const REPEAT: Duration = Duration::from_secs(1);
-/// `EKF_STATUS_REPORT`: attitude, velocity and position are all trusted.
-const ESTIMATOR_TRUSTED: u16 = 0x33F;
-/// GUIDED of ArduCopter.
-const GUIDED: u32 = 4;
-/// Streams to ask for: position 5 Hz, estimator, battery and power 1 Hz.
-const STREAMS: [(f32, f32); 4] = [(33.0, 2e5), (193.0, 1e6), (147.0, 1e6), (1.0, 1e6)];
+/// Estimator flags: attitude, velocity and position are trusted. `ESTIMATOR_STATUS` has the same bits as
+/// `EKF_STATUS_REPORT`; PX4 does not set the relative ones with GNSS.
+const ARDUPILOT_TRUSTED: u16 = 0x33F;
+const PX4_TRUSTED: u16 = 0x37;
+/// From the request to engage until the operator selects OFFBOARD.
+const STREAM_STARTS: Duration = Duration::from_secs(2);
+/// Base mode of `DO_SET_MODE`: custom mode enabled.
+const CUSTOM_MODE: f32 = 1.0;
 
 /// The operator.
 #[derive(Debug)]
@@ -81,6 +90,8 @@ pub struct Operator {
     mode: u32,
     estimator: u16,
     height_m: f32,
+    home_amsl_m: Option<f32>,
+    step_since: Instant,
     acknowledged: Option<(u16, u8)>,
     confirmed: Option<(String, f32)>,
     engaged_at: Option<Instant>,
@@ -89,7 +100,7 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// An operator in front of a fresh ground station.
+    /// An operator at a ground station that was just started.
     #[must_use]
     pub fn new(orders: Orders) -> Operator {
         Operator {
@@ -105,6 +116,8 @@ impl Operator {
             mode: 0,
             estimator: 0,
             height_m: 0.0,
+            home_amsl_m: None,
+            step_since: Instant::ZERO,
             acknowledged: None,
             confirmed: None,
             engaged_at: None,
@@ -119,12 +132,12 @@ impl Operator {
             let taken = self.decoder.push(bytes);
             bytes = &bytes[taken..];
             while let Some(frame) = self.decoder.next_frame() {
-                self.hear(now, &frame);
+                self.take_frame(now, &frame);
             }
         }
     }
 
-    /// One look at the clock: the frames to send.
+    /// The frames to send now.
     pub fn poll(&mut self, now: Instant) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
         if now >= self.next_heartbeat {
@@ -142,7 +155,7 @@ impl Operator {
         frames
     }
 
-    /// When the first decision was heard of.
+    /// When the first decision record arrived.
     #[must_use]
     pub const fn engaged_at(&self) -> Option<Instant> {
         self.engaged_at
@@ -154,13 +167,13 @@ impl Operator {
         self.switched
     }
 
-    /// What was said to the operator (`STATUSTEXT`).
+    /// Texts received (`STATUSTEXT`).
     #[must_use]
     pub fn texts(&self) -> &[(Instant, String)] {
         &self.texts
     }
 
-    /// What the operator waits for, for the day when it waits for ever.
+    /// What the operator waits for.
     #[must_use]
     pub fn waiting_for(&self) -> String {
         match self.step {
@@ -171,30 +184,34 @@ impl Operator {
             Step::Guided => "GUIDED".into(),
             Step::Arm => "the motors to be armed".into(),
             Step::TakeOff | Step::Climb => "the climb".into(),
-            Step::Engage => "the first decision".into(),
+            Step::Engage | Step::Offboard => "the first decision".into(),
             Step::Flying => "the landing".into(),
             Step::Over => "nothing".into(),
         }
     }
 
-    fn hear(&mut self, now: Instant, frame: &Frame) {
+    fn take_frame(&mut self, now: Instant, frame: &Frame) {
         if frame.sender.system != self.orders.system_id {
             return;
         }
         let autopilot = frame.sender.component == 1;
         if autopilot && let Some(estimator) = parse::<EKF_STATUS_REPORT_DATA>(frame) {
             self.estimator = estimator.flags.bits();
+        } else if autopilot && let Some(estimator) = parse::<ESTIMATOR_STATUS_DATA>(frame) {
+            self.estimator = estimator.flags.bits();
+        } else if autopilot && let Some(home) = parse::<HOME_POSITION_DATA>(frame) {
+            self.home_amsl_m = Some(home.altitude as f32 * 1e-3);
         } else if autopilot && let Some(position) = parse::<GLOBAL_POSITION_INT_DATA>(frame) {
             self.height_m = position.relative_alt as f32 * 1e-3;
         } else if let Some(value) = parse::<PARAM_VALUE_DATA>(frame).filter(|_| !autopilot) {
             let name = value.param_id.to_str().unwrap_or_default().to_owned();
             self.confirmed = Some((name, value.param_value));
         } else if let Ok(Some(message)) = Message::decode(frame) {
-            self.hear_message(now, autopilot, &message);
+            self.take_message(now, autopilot, &message);
         }
     }
 
-    fn hear_message(&mut self, now: Instant, autopilot: bool, message: &Message) {
+    fn take_message(&mut self, now: Instant, autopilot: bool, message: &Message) {
         match message {
             Message::Heartbeat(heartbeat) if autopilot => {
                 self.autopilot_heard = true;
@@ -217,8 +234,9 @@ impl Operator {
     }
 
     fn advance(&mut self, now: Instant, frames: &mut Vec<Vec<u8>>) {
-        if let Some(next) = self.finished() {
+        if let Some(next) = self.finished(now) {
             self.step = next;
+            self.step_since = now;
             self.ask_at = now;
             self.acknowledged = None;
             self.confirmed = None;
@@ -236,28 +254,59 @@ impl Operator {
                 frames.push(self.set_parameter(name, value));
             }
             Step::Ready => {
-                for (message_id, interval_us) in STREAMS {
+                for &(message_id, interval_us) in self.streams() {
                     let ask = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
-                    frames.push(self.command(1, ask, [message_id, interval_us, 0.0]));
+                    frames.push(self.command(1, ask, [message_id, interval_us, 0.0, 0.0]));
                 }
             }
-            Step::Guided => frames.push(self.command(1, MavCmd::MAV_CMD_DO_SET_MODE, [1.0, 4.0, 0.0])),
-            Step::Arm => frames.push(self.command(1, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0])),
+            Step::Guided => frames.push(self.select_guided()),
+            Step::Arm => {
+                frames.push(self.command(1, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0, 0.0]));
+            }
             Step::TakeOff => {
-                let altitude_m = self.orders.altitude_m;
-                frames.push(self.command(1, MavCmd::MAV_CMD_NAV_TAKEOFF, [0.0, 0.0, altitude_m]));
+                let altitude_m = self.take_off_altitude_m();
+                frames.push(self.command(1, MavCmd::MAV_CMD_NAV_TAKEOFF, [0.0, 0.0, 0.0, altitude_m]));
             }
             Step::Engage => {
                 let pilot = self.orders.component_id;
-                frames.push(self.command(pilot, MavCmd::MAV_CMD_USER_2, [1.0, 0.0, 0.0]));
+                frames.push(self.command(pilot, MavCmd::MAV_CMD_USER_2, [1.0, 0.0, 0.0, 0.0]));
             }
+            Step::Offboard => frames.push(self.select_guided()),
             Step::Flying => self.switch(now, frames),
             Step::Peers | Step::Climb | Step::Over => {}
         }
     }
 
+    /// Positions, estimator, battery and power; PX4 sends home and estimator by itself.
+    const fn streams(&self) -> &'static [(f32, f32)] {
+        match self.orders.autopilot {
+            AutopilotKind::ArduPilot => &[(33.0, 2e5), (193.0, 1e6), (147.0, 1e6), (1.0, 1e6)],
+            AutopilotKind::Px4 => &[(33.0, 2e5), (230.0, 1e6), (242.0, 1e6), (147.0, 1e6)],
+        }
+    }
+
+    /// Above home for ArduPilot, above mean sea level for PX4.
+    fn take_off_altitude_m(&self) -> f32 {
+        match self.orders.autopilot {
+            AutopilotKind::ArduPilot => self.orders.altitude_m,
+            AutopilotKind::Px4 => self.home_amsl_m.unwrap_or(0.0) + self.orders.altitude_m,
+        }
+    }
+
+    fn guided(&self) -> u32 {
+        VehicleMode::Guided.custom_mode(self.orders.autopilot).unwrap_or(0)
+    }
+
+    fn select_guided(&mut self) -> Vec<u8> {
+        let [param2, param3] = match self.orders.autopilot {
+            AutopilotKind::ArduPilot => [self.guided() as f32, 0.0],
+            AutopilotKind::Px4 => [(self.guided() >> 16 & 0xFF) as f32, (self.guided() >> 24) as f32],
+        };
+        self.command(1, MavCmd::MAV_CMD_DO_SET_MODE, [CUSTOM_MODE, param2, param3, 0.0])
+    }
+
     /// The step that follows, when the present one is done.
-    fn finished(&self) -> Option<Step> {
+    fn finished(&self, now: Instant) -> Option<Step> {
         let configure = |index: usize| {
             if index < self.orders.parameters.len() { Step::Configure(index) } else { Step::Ready }
         };
@@ -272,8 +321,15 @@ impl Operator {
                 let done = self.confirmed.as_ref().is_some_and(|(n, v)| n == name && *v == value);
                 done.then(|| configure(index + 1))
             }
-            Step::Ready => (self.estimator & ESTIMATOR_TRUSTED == ESTIMATOR_TRUSTED).then_some(Step::Guided),
-            Step::Guided => (self.mode == GUIDED).then_some(Step::Arm),
+            Step::Ready => {
+                let (trusted, next) = match self.orders.autopilot {
+                    AutopilotKind::ArduPilot => (ARDUPILOT_TRUSTED, Step::Guided),
+                    AutopilotKind::Px4 => (PX4_TRUSTED, Step::Arm),
+                };
+                let home = self.orders.autopilot == AutopilotKind::ArduPilot || self.home_amsl_m.is_some();
+                (home && self.estimator & trusted == trusted).then_some(next)
+            }
+            Step::Guided => (self.mode == self.guided()).then_some(Step::Arm),
             Step::Arm => self.armed.then_some(Step::TakeOff),
             Step::TakeOff => accepted(MavCmd::MAV_CMD_NAV_TAKEOFF).then_some(Step::Climb),
             Step::Climb => {
@@ -282,7 +338,14 @@ impl Operator {
                     false => Step::Over,
                 })
             }
-            Step::Engage => self.engaged_at.map(|_| Step::Flying),
+            Step::Engage => match self.orders.autopilot {
+                AutopilotKind::ArduPilot => self.engaged_at.map(|_| Step::Flying),
+                AutopilotKind::Px4 => {
+                    let asked = accepted(MavCmd::MAV_CMD_USER_2);
+                    (asked && now - self.step_since >= STREAM_STARTS).then_some(Step::Offboard)
+                }
+            },
+            Step::Offboard => self.engaged_at.map(|_| Step::Flying),
             Step::Flying => (!self.armed).then_some(Step::Over),
             Step::Over => None,
         }
@@ -303,7 +366,7 @@ impl Operator {
         self.ask_at = now + REPEAT;
         let pilot = self.orders.component_id;
         frames.push(match self.switches_by_command() {
-            true => self.command(pilot, MavCmd::MAV_CMD_USER_1, [w_data, 0.0, 0.0]),
+            true => self.command(pilot, MavCmd::MAV_CMD_USER_1, [w_data, 0.0, 0.0, 0.0]),
             false => self.set_parameter("GLN_W_DATA", w_data),
         });
     }
@@ -340,11 +403,17 @@ impl Operator {
         })
     }
 
-    /// Parameters 1, 2 and 7.
-    fn command(&mut self, component: u8, command: MavCmd, [param1, param2, param7]: [f32; 3]) -> Vec<u8> {
+    /// Parameters 1, 2, 3 and 7.
+    fn command(
+        &mut self,
+        component: u8,
+        command: MavCmd,
+        [param1, param2, param3, param7]: [f32; 4],
+    ) -> Vec<u8> {
         self.speaker.frame(&COMMAND_LONG_DATA {
             param1,
             param2,
+            param3,
             param7,
             command,
             target_system: self.orders.system_id,

@@ -1,12 +1,13 @@
-//! The wall's clock, for worlds whose pilot lives by it.
+//! The wall clock, for simulations with a pilot outside this process.
 
 use crate::flight::STEP;
 use std::time::{Duration, Instant};
 
-/// After so many steps at once the machine was asleep or is too slow; the world then loses time instead of racing.
+/// After so many steps at once the machine was asleep or is too slow; the simulation then loses time instead of
+/// catching up.
 const STEPS_AT_ONCE: u32 = 50;
 
-/// Says when the next [`STEP`] of the aircraft's life is due.
+/// Says when the next [`STEP`] is due.
 #[derive(Debug)]
 pub struct Pace {
     step: Duration,
@@ -14,10 +15,10 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// A pace of `haste` seconds of the aircraft's life per second on the wall.
+    /// A pace of `speedup` aircraft seconds per second of the wall clock.
     #[must_use]
-    pub fn new(haste: f32) -> Pace {
-        Pace { step: Duration::from_micros(STEP.as_micros()).div_f32(haste), next: Instant::now() }
+    pub fn new(speedup: f32) -> Pace {
+        Pace { step: Duration::from_micros(STEP.as_micros()).div_f32(speedup), next: Instant::now() }
     }
 
     /// How many steps are due now.

@@ -1,106 +1,127 @@
-//! Aircraft, radio and referee in one: everything around the pilot, bytes in and bytes out, on virtual time.
+//! Aircraft, line, radio and referee in one: everything around the pilot, bytes in and bytes out, on virtual time.
 
-use crate::autopilot::{Copter, CopterMode, LinkId, Truth};
+use crate::autopilot::{AircraftFault, Autopilot, LinkId, Truth, VehicleMode};
+use crate::intruder::{Entry, Intruder};
 use crate::journal::{Journal, Slot};
-use crate::mission::{PlanError, Staged};
+use crate::line::{Lane, Line};
 use crate::modem::Modem;
+use crate::radio_fault::RadioFaults;
 use crate::referee::Referee;
+use crate::script::IncidentKind;
+use crate::setup::{MissionSetup, PlanError};
 use crate::wire::{parse, relayed};
-use crate::wires::{WireFault, Wires};
-use gleaner_link::{Frame, FrameDecoder, Message, TUNNEL_DECISION};
+use gleaner_link::{Address, Frame, FrameDecoder, Message, TUNNEL_DECISION};
 use gleaner_pilot::DecisionRecord;
 use gleaner_policy::DeviceState;
 use gleaner_radio::Report;
 use gleaner_units::{Duration, Instant, Ned};
 use gleaner_world::Field;
-use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd, PARAM_SET_DATA, PARAM_VALUE_DATA};
+use mavlink::dialects::ardupilotmega::PARAM_VALUE_DATA;
 
-/// Whether an operator asks the pilot on board to engage, by command or by parameter.
-fn asks_to_engage(frame: &Frame) -> bool {
-    let command = parse::<COMMAND_LONG_DATA>(frame);
-    let parameter = parse::<PARAM_SET_DATA>(frame);
-    command.is_some_and(|c| c.command == MavCmd::MAV_CMD_USER_2 && c.param1 == 1.0)
-        || parameter.is_some_and(|p| p.param_id.to_str() == Ok("GLN_ENABLE") && p.param_value == 1.0)
-}
+/// The time that the pilot and the aircraft may take to settle after an injected position error.
+const SETTLING: Duration = Duration::from_secs(20);
 
 /// The world around one pilot.
 #[derive(Debug)]
 pub struct Simulation {
-    staged: Staged,
+    setup: MissionSetup,
     now: Instant,
-    copter: Copter,
+    autopilot: Box<dyn Autopilot>,
     modem: Modem,
     referee: Referee,
     journal: Journal,
-    wires: Wires,
-    /// Listens to what the companion says.
+    line: Line,
+    radio_faults: RadioFaults,
+    intruders: Vec<Intruder>,
+    /// Reads the companion's frames.
     tap: FrameDecoder,
-    /// The same for the ground station, for the log.
+    /// Reads the ground station's frames, for the log.
     ground_tap: FrameDecoder,
+    component_id: u8,
     /// Whether slots are being decided; otherwise the modem follows the aircraft.
     deciding: bool,
 }
 
 impl Simulation {
-    /// A simulation at the autopilot's boot.
+    /// A simulation at the autopilot's boot, for a pilot with this component id.
     ///
     /// # Errors
     /// See [`PlanError`].
-    pub fn new(staged: Staged) -> Result<Simulation, PlanError> {
-        let modem = Modem::new(staged.world.clone(), &staged.realization, staged.seed())?;
-        let modem = modem.with_haste(staged.plan.haste);
-        let guard = staged.mission.guard(staged.plan.reserve)?;
-        let referee = Referee::new(&staged, guard);
+    pub fn new(setup: MissionSetup, component_id: u8) -> Result<Simulation, PlanError> {
+        let modem = Modem::new(setup.world.clone(), &setup.realization, setup.seed())?;
+        let modem = modem.with_speedup(setup.plan.speedup).with_ids(setup.device_ids());
         Ok(Simulation {
-            copter: Copter::new(staged.copter),
-            wires: Wires::new(staged.plan.seed),
+            autopilot: setup.plan.autopilot.boot(setup.aircraft),
+            line: Line::new(setup.plan.seed),
+            radio_faults: RadioFaults::default(),
+            intruders: Vec::new(),
             now: Instant::ZERO,
             modem,
-            referee,
+            referee: Referee::new(&setup, component_id),
             journal: Journal::default(),
             tap: FrameDecoder::new(),
             ground_tap: FrameDecoder::new(),
+            component_id,
             deciding: false,
-            staged,
+            setup,
         })
     }
 
-    /// Lets time pass until `now`.
+    /// Advances time to `now`.
     pub fn step(&mut self, now: Instant) {
         self.now = now;
-        self.copter.step(now);
-        let truth = self.copter.truth();
+        self.autopilot.step(now);
+        self.poll_intruders();
+        let truth = self.autopilot.truth();
         self.referee.watch(now, &truth);
-        self.journal.see(now, &truth);
-        // Once somebody else flies, the devices are heard from wherever the aircraft is.
-        let landing = truth.mode == CopterMode::Land;
-        self.deciding &= truth.mode == CopterMode::Guided || landing;
+        self.journal.track_point(now, &truth);
+        // When somebody else flies, the devices are heard from wherever the aircraft is.
+        self.deciding &= matches!(truth.mode, VehicleMode::Guided | VehicleMode::Land);
         if !self.deciding
             && !truth.on_ground
-            && let Some(cell) = self.staged.frame.cell(&truth.position)
+            && let Some(cell) = self.setup.frame.cell(&truth.position)
         {
             self.modem.carry_to(cell);
         }
     }
 
-    /// What the companion sends to the autopilot, in any pieces.
-    pub fn hear_companion(&mut self, mut bytes: &[u8]) {
+    fn poll_intruders(&mut self) {
         let now = self.now;
-        let all = bytes;
+        self.intruders.retain(|intruder| !intruder.is_over(now));
+        let frames: Vec<_> = self.intruders.iter_mut().flat_map(|intruder| intruder.poll(now)).collect();
+        for (entry, frame) in frames {
+            match entry {
+                Entry::Companion => self.line.send(now, Lane::Down, frame),
+                Entry::Ground => self.autopilot.receive(LinkId::GROUND, &frame),
+            }
+        }
+    }
+
+    /// Bytes from the companion to the autopilot, in any pieces.
+    pub fn from_companion(&mut self, mut bytes: &[u8]) {
+        let now = self.now;
         while !bytes.is_empty() {
             let taken = self.tap.push(bytes);
             bytes = &bytes[taken..];
             while let Some(frame) = self.tap.next_frame() {
-                self.journal.frame(now, relayed(&frame));
-                self.overhear(&frame);
+                let raw = relayed(&frame);
+                self.journal.frame(now, raw.clone());
+                self.referee.sent(now, &frame);
+                self.read_companion(&frame);
+                self.line.send(now, Lane::Up, raw);
             }
         }
-        self.copter.receive(LinkId::COMPANION, &self.wires.carry(now, all.to_vec()));
+        self.carry_up();
     }
 
-    /// What the ground station sends.
-    pub fn hear_ground(&mut self, mut bytes: &[u8]) {
+    fn carry_up(&mut self) {
+        for frame in self.line.arrived(self.now, Lane::Up) {
+            self.autopilot.receive(LinkId::COMPANION, &frame);
+        }
+    }
+
+    /// Bytes from the ground station, in any pieces.
+    pub fn from_ground(&mut self, mut bytes: &[u8]) {
         let now = self.now;
         let all = bytes;
         while !bytes.is_empty() {
@@ -108,23 +129,29 @@ impl Simulation {
             bytes = &bytes[taken..];
             while let Some(frame) = self.ground_tap.next_frame() {
                 self.journal.frame(now, relayed(&frame));
-                if asks_to_engage(&frame) {
-                    self.referee.hear_engage_request();
-                }
             }
         }
-        self.copter.receive(LinkId::GROUND, all);
+        self.autopilot.receive(LinkId::GROUND, all);
     }
 
-    /// Frames from the autopilot for the companion.
+    /// Frames that have arrived at the companion. The caller reports each to [`Simulation::delivered`] when the pilot
+    /// reads it.
     pub fn to_companion(&mut self) -> Vec<Vec<u8>> {
-        let frames = self.copter.transmit(LinkId::COMPANION);
-        frames.into_iter().map(|frame| self.wires.carry(self.now, frame)).collect()
+        self.carry_up();
+        for frame in self.autopilot.transmit(LinkId::COMPANION) {
+            self.line.send(self.now, Lane::Down, frame);
+        }
+        self.line.arrived(self.now, Lane::Down)
+    }
+
+    /// The pilot reads a frame that arrived at the companion at `at`.
+    pub fn delivered(&mut self, at: Instant, frame: &[u8]) {
+        self.referee.delivered(at, frame);
     }
 
     /// Frames from the vehicle for the ground station.
     pub fn to_ground(&mut self) -> Vec<Vec<u8>> {
-        let frames = self.copter.transmit(LinkId::GROUND);
+        let frames = self.autopilot.transmit(LinkId::GROUND);
         for frame in &frames {
             // The companion's were logged when they were sent. Byte 6 of a version 2 frame is the component.
             if frame.get(6) == Some(&1) {
@@ -134,28 +161,23 @@ impl Simulation {
         frames
     }
 
-    /// The harness's own link to the autopilot: bytes in, frames out.
+    /// The harness's own link to the autopilot: frames in, frames out.
     pub fn crew(&mut self, frames: &[Vec<u8>]) -> Vec<Vec<u8>> {
         for frame in frames {
-            self.copter.receive(LinkId::CREW, frame);
+            self.autopilot.receive(LinkId::CREW, frame);
         }
-        self.copter.transmit(LinkId::CREW)
+        self.autopilot.transmit(LinkId::CREW)
     }
 
-    /// Reports from the radio modem that are due.
+    /// Reports from the radio that are due.
     pub fn radio(&mut self) -> Vec<Report> {
         let reports = self.modem.reports(self.now);
-        if self.wires.radio_is_silent(self.now) { Vec::new() } else { reports }
+        self.radio_faults.distort(self.now, reports)
     }
 
-    fn overhear(&mut self, frame: &Frame) {
+    fn read_companion(&mut self, frame: &Frame) {
         if let Some(value) = parse::<PARAM_VALUE_DATA>(frame) {
-            self.referee.hear_parameter(value.param_id.to_str().unwrap_or_default(), value.param_value);
-        } else if frame.message_id == COMMAND_LONG_DATA::ID {
-            let asks_mode = |c: &COMMAND_LONG_DATA| c.command == MavCmd::MAV_CMD_DO_SET_MODE;
-            if parse::<COMMAND_LONG_DATA>(frame).as_ref().is_some_and(asks_mode) {
-                self.referee.hear_mode_request(self.now);
-            }
+            self.referee.parameter(value.param_id.to_str().unwrap_or_default(), value.param_value);
         } else if let Ok(Some(Message::Tunnel { payload_type: TUNNEL_DECISION, payload, .. })) =
             Message::decode(frame)
             && let Some(record) = DecisionRecord::decode(&payload)
@@ -166,8 +188,8 @@ impl Simulation {
 
     /// A decision begins a slot: the present one is served, the next one is heard.
     fn decided(&mut self, record: DecisionRecord) {
-        let truth = self.copter.truth();
-        let flown = self.referee.hear_decision(self.now, &record, &truth);
+        let truth = self.autopilot.truth();
+        let flown = self.referee.decided(self.now, &record, &truth);
         let heard = self.heard();
         let serving = flown.then(|| self.modem.slot(record.cell, record.action)).flatten();
         self.deciding |= flown;
@@ -195,20 +217,63 @@ impl Simulation {
             .collect()
     }
 
-    /// Something goes wrong with a wire.
-    pub fn fail_wire(&mut self, fault: WireFault, lasts: Duration) {
-        self.wires.fail(self.now, fault, lasts);
+    /// Injects an incident. Faults of the companion computer are injected there, not here.
+    pub fn inject(&mut self, kind: IncidentKind) {
+        let now = self.now;
+        match kind {
+            IncidentKind::Aircraft(fault) => {
+                self.prepare_referee(fault);
+                self.autopilot.inject(fault);
+            }
+            IncidentKind::Line(fault, lasts) => self.line.fail(now, fault, lasts),
+            IncidentKind::Radio(fault, lasts) => self.radio_faults.begin(now, fault, lasts),
+            IncidentKind::Intrusion(intrusion, lasts) => {
+                let pilot = Address::new(self.setup.aircraft.system_id, self.component_id);
+                let down_m = self.setup.aircraft.stand.down_m - self.setup.altitude_m();
+                let seed = self.setup.plan.seed;
+                self.intruders.push(Intruder::new(now, intrusion, lasts, pilot, down_m, seed));
+            }
+            IncidentKind::Computer(_) => {}
+        }
     }
 
-    /// The simulated autopilot, for injections.
-    pub fn copter_mut(&mut self) -> &mut Copter {
-        &mut self.copter
+    /// Tells the referee which of its figures a fault changes.
+    fn prepare_referee(&mut self, fault: AircraftFault) {
+        match fault {
+            AircraftFault::PositionJump(_, lasts) => {
+                self.referee.disturbed_until(self.now + lasts + SETTLING)
+            }
+            AircraftFault::OriginShift(_) => self.referee.disturbed_until(self.now + SETTLING),
+            AircraftFault::Consumption(factor) => self.referee.price_changes(factor),
+            AircraftFault::Wind(wind) => {
+                let [north, east] = wind.velocity_mps;
+                let squared = north * north + east * east + 2.0 * wind.gust_mps * wind.gust_mps;
+                let doubling = self.setup.aircraft.pack.doubling_mps;
+                self.referee.price_changes(1.0 + squared / (doubling * doubling));
+            }
+            _ => {}
+        }
+        if let AircraftFault::ChargeLost(units) = fault {
+            let mut truth = self.truth();
+            truth.battery = truth.battery - units;
+            self.referee.charge_lost(&truth);
+        }
     }
 
-    /// What is really so.
+    /// The companion's program ended.
+    pub fn companion_restarts(&mut self) {
+        self.referee.companion_restarts();
+    }
+
+    /// The companion's program does not run until then.
+    pub fn companion_stalls_until(&mut self, until: Instant) {
+        self.referee.companion_stalls_until(until);
+    }
+
+    /// Ground truth.
     #[must_use]
     pub fn truth(&self) -> Truth {
-        self.copter.truth()
+        self.autopilot.truth()
     }
 
     /// The time, since the autopilot's boot.
@@ -229,22 +294,22 @@ impl Simulation {
         &self.referee
     }
 
-    /// What happened so far.
+    /// What was recorded.
     #[must_use]
     pub const fn journal(&self) -> &Journal {
         &self.journal
     }
 
-    /// What was fixed before the flight.
+    /// The mission as it was set up.
     #[must_use]
-    pub const fn staged(&self) -> &Staged {
-        &self.staged
+    pub const fn setup(&self) -> &MissionSetup {
+        &self.setup
     }
 
-    /// Where the aircraft is on the grid: metres east and north of its south-west corner.
+    /// A position on the grid: metres east and north of its south-west corner.
     #[must_use]
     pub fn on_grid(&self, position: &Ned) -> (f32, f32) {
-        let point = self.staged.frame.point(position);
+        let point = self.setup.frame.point(position);
         (point.east_m, point.north_m)
     }
 }

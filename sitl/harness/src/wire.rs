@@ -1,4 +1,4 @@
-//! Frames as the simulated ends of a link write and read them.
+//! MAVLink frames of the simulated participants.
 //!
 //! Reading goes through [`gleaner_link::FrameDecoder`]. Writing goes through the types that the MAVLink definitions
 //! generate, not through the firmware's own writer, so the firmware is never tested against itself.
@@ -7,7 +7,7 @@ use gleaner_link::{Address, Frame, WireVersion};
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavHeader, MavlinkVersion, Message, MessageData};
 
-/// Someone who sends messages: an address and a packet counter.
+/// A sender of messages: an address and a packet counter.
 #[derive(Clone, Debug)]
 pub(crate) struct Speaker {
     address: Address,
@@ -32,8 +32,8 @@ impl Speaker {
         raw.raw_bytes().to_vec()
     }
 
-    /// The same for a payload laid out by hand: the generated types cannot hold numbers that their enumerations do
-    /// not list, and an unknown command must still be answered by its number.
+    /// The same for a payload laid out by hand: the generated types cannot hold numbers that their enumerations do not
+    /// list.
     pub fn raw_frame(&mut self, message_id: u32, payload: &[u8]) -> Vec<u8> {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
@@ -81,7 +81,7 @@ pub(crate) fn parse<D: MessageData>(frame: &Frame) -> Option<D> {
     D::deser(MavlinkVersion::V2, frame.payload()).ok()
 }
 
-/// Whom a frame is for, `(system, component)`, 0 for everybody.
+/// The target of a frame; 0 is broadcast.
 pub(crate) fn target(frame: &Frame) -> Address {
     let at = |system: usize| {
         let byte = |at: usize| frame.payload().get(at).copied().unwrap_or(0);
@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_router_passes_on_what_it_got() {
+    fn relayed_frames_are_identical() {
         let mut speaker = Speaker::new(Address::new(255, 190));
         let command = COMMAND_LONG_DATA {
             command: MavCmd::MAV_CMD_USER_2,
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_numbers_still_have_a_target() {
+    fn unlisted_numbers_have_a_target() {
         let mut speaker = Speaker::new(Address::new(1, 191));
         // Payload type 40001 is none of the listed ones.
         let mut payload = [0; 133];

@@ -1,11 +1,11 @@
 //! A pilot behind byte streams: a board, an emulator or a companion computer.
 //!
-//! Such a pilot keeps its own clock, which nobody can hurry or stop, so the world keeps pace with the wall. The
-//! aircraft alone may live faster ([`crate::MissionPlan::haste`]): it flies from rest to rest, so between two decisions
-//! the pilot loses nothing by an aircraft that arrives sooner, and a mission of six minutes takes one and a half.
+//! Such a pilot has its own clock, so the simulation follows the wall clock. The aircraft may be faster
+//! ([`crate::MissionPlan::speedup`]): between two decisions it flies from rest to rest, so an earlier arrival changes
+//! nothing for the pilot, and a mission of six minutes takes one and a half.
 
-use crate::aboard::Aboard;
-use crate::flight::{Ending, Flight, Flown};
+use crate::companion::Companion;
+use crate::flight::{Ending, FlightResult, FlightRun};
 use crate::pace::Pace;
 use crate::simulation::Simulation;
 use crate::wire::Speaker;
@@ -18,9 +18,9 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 use std::io;
 use std::time::{self, Duration};
 
-/// How long the pilot's port may be closed in flight: a cable that is plugged in again.
+/// How long the pilot's port may be closed in flight, for a cable that is plugged in again.
 const GONE_LIMIT: Duration = Duration::from_secs(5);
-/// Reads per port and exchange: a flood on one port must not stop the world.
+/// Reads per port and exchange: a flood on one port must not stop the simulation.
 const READS_AT_ONCE: usize = 64;
 
 /// Somewhere else and on its own clock: a board, an emulator or a companion computer behind one port for the
@@ -60,15 +60,15 @@ impl Wired {
         self.autopilot.state() == State::Up
     }
 
-    /// Mends ports that went down; call it some times a second.
+    /// Reopens ports that went down; call it some times a second.
     pub fn maintain(&mut self, now: time::Instant) {
-        // Peers come and go; what matters of it is in `is_up`.
+        // A closed port is no error here: `is_up` reports it.
         for port in [Some(&mut self.autopilot), self.radio.as_mut()].into_iter().flatten() {
             let _ = port.maintain(now);
         }
     }
 
-    /// Waits for a pilot that connects; whether one has. What it says first is kept.
+    /// Waits for a pilot to connect; whether one has. Its first bytes are kept.
     ///
     /// # Errors
     /// The operating system cannot wait.
@@ -89,11 +89,11 @@ impl Wired {
         }
     }
 
-    /// Sleeps until a port has something to say or the time is over.
+    /// Sleeps until a port is readable or the time is over.
     pub fn rest(&self, at_most: Duration) {
         let ports: Vec<&Port> = [Some(&self.autopilot), self.radio()].into_iter().flatten().collect();
         if wait(&ports, at_most).is_err() {
-            // Without the system's help.
+            // The system cannot wait on the ports.
             std::thread::sleep(at_most);
         }
     }
@@ -113,14 +113,15 @@ impl Wired {
     }
 }
 
-impl Aboard for Wired {
-    fn exchange(&mut self, simulation: &mut Simulation, _: Instant) {
-        receive(&mut self.autopilot, |bytes| simulation.hear_companion(bytes));
+impl Companion for Wired {
+    fn exchange(&mut self, simulation: &mut Simulation, now: Instant) {
+        receive(&mut self.autopilot, |bytes| simulation.from_companion(bytes));
         if let Some(radio) = &mut self.radio {
-            // A radio hears nothing, but a listening port must look for its peer.
+            // The radio port receives nothing, but a listening port must look for its peer.
             receive(radio, |_| {});
         }
         for frame in simulation.to_companion() {
+            simulation.delivered(now, &frame);
             self.autopilot.send(&frame);
         }
         for report in simulation.radio() {
@@ -129,7 +130,7 @@ impl Aboard for Wired {
     }
 }
 
-/// Reads what is there.
+/// Reads the available bytes.
 pub(crate) fn receive(port: &mut Port, mut take: impl FnMut(&[u8])) {
     let mut buffer = [0; RECEIVE_BYTES];
     for _ in 0..READS_AT_ONCE {
@@ -140,14 +141,14 @@ pub(crate) fn receive(port: &mut Port, mut take: impl FnMut(&[u8])) {
     }
 }
 
-/// Flies a mission in the wall's time, from boot to landing. `watch` is asked before each step; what it gives ends the
-/// flight.
+/// Flies a mission on the wall clock, from boot to landing. `watch` runs before each step; an ending that it returns
+/// ends the flight.
 pub fn fly_wired(
-    mut flight: Flight,
+    mut flight: FlightRun,
     wired: &mut Wired,
-    mut watch: impl FnMut(&Flight, &mut Wired) -> Option<Ending>,
-) -> Flown {
-    let mut pace = Pace::new(flight.simulation().staged().plan.haste);
+    mut watch: impl FnMut(&FlightRun, &mut Wired) -> Option<Ending>,
+) -> FlightResult {
+    let mut pace = Pace::new(flight.simulation().setup().plan.speedup);
     let mut up_at = time::Instant::now();
     loop {
         for _ in 0..pace.due() {

@@ -1,12 +1,12 @@
 //! Whole missions through real MAVLink bytes, flown by simple policies.
 
 use gleaner_harness::{
-    Breach, CopterMode, Ending, Flown, Incident, IncidentKind, MissionPlan, Referee, Staged, Switch, Truth,
-    WireFault, Wishes, fly, trajectory,
+    AircraftFault, AutopilotKind, Ending, FlightResult, FlightScript, Incident, IncidentKind, LineFault,
+    MissionPlan, MissionSetup, RadioFault, Switch, VehicleMode, fly, trajectory,
 };
 use gleaner_pilot::State;
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
-use gleaner_units::{Action, BatteryUnits, Duration, Instant};
+use gleaner_units::{Action, BatteryUnits, Duration};
 use gleaner_world::{Episode, ScenarioKind, World};
 use std::sync::Arc;
 
@@ -53,22 +53,22 @@ fn world() -> Arc<World> {
     Arc::new(World::default_world())
 }
 
-fn flown<P: Policy>(plan: MissionPlan, wishes: Wishes, policy: P) -> Flown {
-    fly(Staged::new(world(), plan).unwrap(), wishes, policy, Ok(())).unwrap()
+fn flown<P: Policy>(plan: MissionPlan, script: FlightScript, policy: P) -> FlightResult {
+    fly(MissionSetup::new(world(), plan).unwrap(), script, policy, Ok(())).unwrap()
 }
 
 fn rd(seed: u64) -> MissionPlan {
     MissionPlan::new(ScenarioKind::ReachDestination, seed)
 }
 
-fn texts(flown: &Flown) -> Vec<&str> {
+fn texts(flown: &FlightResult) -> Vec<&str> {
     flown.texts.iter().map(|(_, text)| text.as_str()).collect()
 }
 
 #[test]
 fn the_shortest_missions_cost_32_and_2_units() {
     for (kind, units) in [(ScenarioKind::ReachDestination, 32.0), (ScenarioKind::ReturnBase, 2.0)] {
-        let flown = flown(MissionPlan::new(kind, 1), Wishes::plain(0.0), Homeward);
+        let flown = flown(MissionPlan::new(kind, 1), FlightScript::plain(0.0), Homeward);
         let figures = flown.figures();
         assert_eq!(figures.violations, [], "{:?}", texts(&flown));
         assert_eq!(flown.ending, Ending::OnTheGround, "waited for {}", flown.waiting_for);
@@ -79,16 +79,16 @@ fn the_shortest_missions_cost_32_and_2_units() {
 }
 
 #[test]
-fn a_flight_collects_what_an_episode_with_the_same_actions_collects() {
+fn a_flight_collects_what_its_episode_collects() {
     for (seed, wander_m) in [(5, 0.0), (6, 0.3)] {
         let switches = vec![Switch { after: Duration::from_secs(60), w_data: 0.1 }];
         let plan = MissionPlan { wander_m, ..rd(seed) };
-        let flown = flown(plan, Wishes { switches, ..Wishes::plain(1.0) }, Waiter);
+        let flown = flown(plan, FlightScript { switches, ..FlightScript::plain(1.0) }, Waiter);
         let figures = flown.figures();
         assert_eq!(figures.violations, []);
         assert!(figures.landed);
-        let staged = flown.simulation.staged();
-        let mut episode = Episode::new(world(), &staged.realization, staged.seed()).unwrap();
+        let setup = flown.simulation.setup();
+        let mut episode = Episode::new(world(), &setup.realization, setup.seed()).unwrap();
         let mut paid = BatteryUnits(0.0);
         for slot in flown.simulation.journal().slots() {
             assert_eq!((slot.record.cell, slot.record.battery), (episode.uav(), episode.battery()));
@@ -100,7 +100,7 @@ fn a_flight_collects_what_an_episode_with_the_same_actions_collects() {
         assert_eq!(flown.simulation.field(), episode.field());
         assert_eq!(figures.energy, paid);
         assert!(figures.collected > 0.0);
-        // Hovering until the preference changes: the pilot has heard of it.
+        // Hovering until the preference changes.
         assert_eq!(figures.switches, 1);
         let hovers = |weight: f32| {
             let of = |slot: &&gleaner_harness::Slot| slot.record.w_data == weight;
@@ -113,8 +113,8 @@ fn a_flight_collects_what_an_episode_with_the_same_actions_collects() {
 }
 
 #[test]
-fn the_guard_brings_a_greedy_hoverer_home_on_its_last_unit() {
-    let flown = flown(rd(2), Wishes::plain(1.0), Waiter);
+fn the_guard_brings_a_greedy_hoverer_home() {
+    let flown = flown(rd(2), FlightScript::plain(1.0), Waiter);
     let figures = flown.figures();
     assert!(figures.is_good(), "{:?} {:?}", figures.violations, texts(&flown));
     assert_eq!(figures.energy, BatteryUnits(80.0), "all of the budget, and not more");
@@ -125,7 +125,7 @@ fn the_guard_brings_a_greedy_hoverer_home_on_its_last_unit() {
 fn switches_go_out_by_command_and_by_parameter() {
     let at = |seconds: u64, w_data: f32| Switch { after: Duration::from_secs(seconds), w_data };
     let switches = vec![at(10, 0.2), at(20, 0.9), at(30, 0.3)];
-    let flown = flown(rd(3), Wishes { switches, ..Wishes::plain(0.0) }, Homeward);
+    let flown = flown(rd(3), FlightScript { switches, ..FlightScript::plain(0.0) }, Homeward);
     assert!(flown.figures().is_good());
     assert_eq!(flown.figures().switches, 3);
     let mut weights: Vec<f32> = flown.simulation.journal().slots().iter().map(|s| s.record.w_data).collect();
@@ -134,19 +134,19 @@ fn switches_go_out_by_command_and_by_parameter() {
 }
 
 #[test]
-fn taken_over_the_pilot_is_passive_and_stays_so() {
+fn after_a_take_over_the_pilot_stays_passive() {
     let after = Duration::from_secs(40);
-    for mode in [CopterMode::Loiter, CopterMode::Brake, CopterMode::Stabilize] {
+    for mode in [VehicleMode::Hold, VehicleMode::Brake, VehicleMode::Stabilize] {
         let incidents = vec![
-            Incident { after, kind: IncidentKind::PilotSelects(mode) },
+            Incident { after, kind: IncidentKind::pilot_selects(mode) },
             // Giving GUIDED back is no request to engage.
             Incident {
                 after: after + Duration::from_secs(20),
-                kind: IncidentKind::PilotSelects(CopterMode::Guided),
+                kind: IncidentKind::pilot_selects(VehicleMode::Guided),
             },
-            Incident { after: after + Duration::from_secs(40), kind: IncidentKind::PilotSelects(mode) },
+            Incident { after: after + Duration::from_secs(40), kind: IncidentKind::pilot_selects(mode) },
         ];
-        let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(0.0) }, Homeward);
+        let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(0.0) }, Homeward);
         let figures = flown.figures();
         assert_eq!(
             (flown.ending, flown.state),
@@ -160,22 +160,28 @@ fn taken_over_the_pilot_is_passive_and_stays_so() {
 }
 
 #[test]
-fn a_target_beyond_the_fence_is_noticed_by_the_lack_of_progress() {
-    let incidents = vec![Incident { after: Duration::from_secs(1), kind: IncidentKind::Fence(150.0) }];
-    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(0.0) }, Homeward);
+fn a_target_outside_the_fence_ends_in_a_return() {
+    let incidents = vec![Incident {
+        after: Duration::from_secs(1),
+        kind: IncidentKind::Aircraft(AircraftFault::Fence(150.0)),
+    }];
+    let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(0.0) }, Homeward);
     let figures = flown.figures();
     assert_eq!(figures.violations, [], "{:?}", texts(&flown));
     assert!(!figures.landed);
     let said = |part: &str| texts(&flown).iter().any(|text| text.contains(part));
     assert!(said("no progress"), "{:?}", texts(&flown));
     assert_eq!((flown.ending, flown.state), (Ending::OnTheGround, Some(State::Fault)));
-    assert_eq!(flown.simulation.truth().mode, CopterMode::Rtl, "handed back to the autopilot");
+    assert_eq!(flown.simulation.truth().mode, VehicleMode::Return, "handed back to the autopilot");
 }
 
 #[test]
 fn an_autopilot_that_reboots_in_flight_is_left_alone() {
-    let incidents = vec![Incident { after: Duration::from_secs(20), kind: IncidentKind::AutopilotReboots }];
-    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let incidents = vec![Incident {
+        after: Duration::from_secs(20),
+        kind: IncidentKind::Aircraft(AircraftFault::Reboot),
+    }];
+    let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
     let figures = flown.figures();
     assert_eq!(figures.violations, [], "{:?}", texts(&flown));
     assert_eq!(flown.ending, Ending::OnTheGround);
@@ -183,16 +189,16 @@ fn an_autopilot_that_reboots_in_flight_is_left_alone() {
 }
 
 #[test]
-fn after_a_fault_the_aircraft_is_handed_back_however_long_the_line_is_bad() {
+fn after_a_fault_on_a_noisy_line_the_autopilot_returns() {
     // Now and then a heartbeat comes through and shows that it is still ours; requests and answers are lost.
-    let noise = IncidentKind::Wire(WireFault::LineNoise(8), Duration::from_secs(60));
+    let noise = IncidentKind::Line(LineFault::Noise(8), Duration::from_secs(60));
     let incidents = vec![Incident { after: Duration::from_secs(20), kind: noise }];
-    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
     let figures = flown.figures();
     assert_eq!(figures.violations, [], "{:?}", texts(&flown));
     assert_eq!((flown.ending, flown.state), (Ending::OnTheGround, Some(State::Fault)), "{:?}", texts(&flown));
-    assert_eq!(flown.simulation.truth().mode, CopterMode::Rtl, "handed back to the autopilot");
-    // What the pilot said; on the noisy line the operator need not have heard it.
+    assert_eq!(flown.simulation.truth().mode, VehicleMode::Return, "handed back to the autopilot");
+    // The pilot's own text; on the noisy line the operator may not receive it.
     let said = |frame: &[u8]| frame.windows(14).any(|part| part == b"gleaner: fault");
     let lost = flown.simulation.journal().frames().find(|(_, frame)| said(frame));
     let (lost_at, _) = lost.expect("a fault");
@@ -201,11 +207,11 @@ fn after_a_fault_the_aircraft_is_handed_back_however_long_the_line_is_bad() {
 }
 
 #[test]
-fn an_estimator_that_fails_for_a_moment_is_waited_for_and_the_autopilots_landing_is_its_own() {
+fn a_short_estimator_failure_is_waited_for() {
     for (millis, is_good) in [(800, true), (5_000, false)] {
-        let kind = IncidentKind::EstimatorFails(Duration::from_millis(millis));
+        let kind = IncidentKind::Aircraft(AircraftFault::EstimatorUntrusted(Duration::from_millis(millis)));
         let incidents = vec![Incident { after: Duration::from_secs(20), kind }];
-        let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+        let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
         let figures = flown.figures();
         assert_eq!(figures.violations, [], "{:?}", texts(&flown));
         assert_eq!((flown.ending, figures.landed), (Ending::OnTheGround, is_good), "{:?}", texts(&flown));
@@ -215,69 +221,35 @@ fn an_estimator_that_fails_for_a_moment_is_waited_for_and_the_autopilots_landing
 }
 
 #[test]
-fn a_pilot_who_flew_while_the_line_was_cut_keeps_the_aircraft() {
+fn a_take_over_during_a_line_cut_is_respected() {
     let at = |seconds, kind| Incident { after: Duration::from_secs(seconds), kind };
     let incidents = vec![
-        at(20, IncidentKind::Wire(WireFault::LineCut, Duration::from_secs(25))),
-        at(22, IncidentKind::PilotSelects(CopterMode::Rtl)),
-        at(36, IncidentKind::PilotSelects(CopterMode::Guided)),
-        at(80, IncidentKind::PilotSelects(CopterMode::Loiter)),
+        at(20, IncidentKind::Line(LineFault::Cut(None), Duration::from_secs(25))),
+        at(22, IncidentKind::pilot_selects(VehicleMode::Return)),
+        at(36, IncidentKind::pilot_selects(VehicleMode::Guided)),
+        at(80, IncidentKind::pilot_selects(VehicleMode::Hold)),
     ];
-    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(0.0) }, Homeward);
+    let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(0.0) }, Homeward);
     assert_eq!(flown.figures().violations, [], "{:?}", texts(&flown));
     assert_eq!((flown.ending, flown.state), (Ending::TakenOver, Some(State::Fault)), "{:?}", texts(&flown));
     assert!(texts(&flown).iter().any(|text| text.contains("moved by another")), "{:?}", texts(&flown));
 }
 
 #[test]
-fn the_referee_sees_a_pilot_that_takes_the_aircraft_back() {
-    let flown = flown(rd(4), Wishes::plain(0.0), Homeward);
-    let staged = flown.simulation.staged();
-    let record = &flown.simulation.journal().slots()[0].record;
-    let guided = Truth {
-        mode: CopterMode::Guided,
-        mode_is_companions: false,
-        armed: true,
-        on_ground: false,
-        ..flown.simulation.truth()
-    };
-    let loiter = Truth { mode: CopterMode::Loiter, ..guided };
-    let returns = Truth { mode: CopterMode::Rtl, mode_is_companions: true, ..guided };
-    let now = Instant::from_millis(60_000);
-    let judge = |acts: &dyn Fn(&mut Referee)| {
-        let guard = staged.mission.guard(staged.plan.reserve).unwrap();
-        let mut referee = Referee::new(staged, guard);
-        referee.hear_decision(now, record, &guided);
-        acts(&mut referee);
-        referee.violations().iter().any(|violation| violation.breach == Breach::TookItBack)
-    };
-    let watch =
-        |referee: &mut Referee, truths: &[Truth]| truths.iter().for_each(|truth| referee.watch(now, truth));
-    assert!(!judge(&|referee| watch(referee, &[guided, returns])), "after a fault it may");
-    assert!(judge(&|referee| watch(referee, &[guided, loiter, returns])));
-    assert!(judge(&|referee| {
-        watch(referee, &[loiter, guided]);
-        referee.hear_decision(now, record, &guided);
-    }));
-    assert!(!judge(&|referee| {
-        watch(referee, &[loiter, guided]);
-        referee.hear_engage_request();
-        referee.hear_decision(now, record, &guided);
-    }));
-}
-
-#[test]
-fn a_radio_that_falls_silent_costs_data_and_nothing_else() {
-    let silent = IncidentKind::Wire(WireFault::RadioSilent, Duration::from_secs(60));
+fn a_silent_radio_costs_only_data() {
+    let silent = IncidentKind::Radio(RadioFault::Silent, Duration::from_secs(60));
     let incidents = vec![Incident { after: Duration::from_secs(20), kind: silent }];
-    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
     assert!(flown.figures().is_good(), "{:?}", texts(&flown));
 }
 
 #[test]
 fn a_battery_failsafe_sends_it_home() {
-    let incidents = vec![Incident { after: Duration::from_secs(10), kind: IncidentKind::Voltage(10.2) }];
-    let flown = flown(rd(4), Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let incidents = vec![Incident {
+        after: Duration::from_secs(10),
+        kind: IncidentKind::Aircraft(AircraftFault::Voltage(10.2)),
+    }];
+    let flown = flown(rd(4), FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
     let figures = flown.figures();
     assert!(figures.is_good(), "{:?} {:?}", figures.violations, texts(&flown));
     let hovers =
@@ -288,20 +260,20 @@ fn a_battery_failsafe_sends_it_home() {
 
 #[test]
 fn a_weak_battery_brings_it_home_early() {
-    let kind = IncidentKind::LosesBattery(BatteryUnits(40.0));
+    let kind = IncidentKind::Aircraft(AircraftFault::ChargeLost(BatteryUnits(40.0)));
     let incidents = vec![Incident { after: Duration::from_secs(10), kind }];
     // No decision pays for the landing: where the measured charge is the limit, the reserve must.
     let plan = MissionPlan { reserve: BatteryUnits(12.0), ..rd(4) };
-    let flown = flown(plan, Wishes { incidents, ..Wishes::plain(1.0) }, Waiter);
+    let flown = flown(plan, FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
     let figures = flown.figures();
     assert!(figures.is_good(), "{:?} {:?}", figures.violations, texts(&flown));
     assert!((35.0..65.0).contains(&figures.energy.0), "{:?}", figures.energy);
 }
 
 #[test]
-fn flying_takes_no_more_from_the_pack_than_the_decisions_pay() {
-    let flown = flown(rd(4), Wishes::plain(1.0), Waiter);
-    let pack = flown.simulation.staged().copter.pack;
+fn the_pack_loses_no_more_than_the_decisions_pay() {
+    let flown = flown(rd(4), FlightScript::plain(1.0), Waiter);
+    let pack = flown.simulation.setup().aircraft.pack;
     let taken = pack.capacity - flown.simulation.truth().battery;
     // Taking off and landing: 100 s at most.
     assert!(taken.0 <= flown.figures().energy.0 + 100.0 * pack.hover_per_s, "{taken:?}");
@@ -310,7 +282,7 @@ fn flying_takes_no_more_from_the_pack_than_the_decisions_pay() {
 #[test]
 fn the_picture_shows_devices_hovers_and_switches() {
     let switches = vec![Switch { after: Duration::from_secs(60), w_data: 0.1 }];
-    let flown = flown(rd(5), Wishes { switches, ..Wishes::plain(1.0) }, Waiter);
+    let flown = flown(rd(5), FlightScript { switches, ..FlightScript::plain(1.0) }, Waiter);
     let picture = trajectory(&flown.simulation, &flown.figures(), "waiter");
     assert!(picture.starts_with("<svg") && picture.trim_end().ends_with("</svg>"));
     for part in ["RD, seed 5, 6 devices", "policy waiter", "hovered for ", "w 1.00 \u{2192} 0.10", "#time"] {
@@ -329,17 +301,36 @@ fn the_same_seed_gives_the_same_bytes() {
     let files = || {
         let switches = vec![Switch { after: Duration::from_secs(30), w_data: 0.2 }];
         let plan = MissionPlan { wander_m: 0.2, ..rd(9) };
-        let flown = flown(plan, Wishes { switches, ..Wishes::plain(0.9) }, Waiter);
+        let flown = flown(plan, FlightScript { switches, ..FlightScript::plain(0.9) }, Waiter);
         let (mut tlog, mut decisions) = (Vec::new(), Vec::new());
         flown.simulation.journal().write_tlog(&mut tlog).unwrap();
         flown
             .simulation
             .journal()
-            .write_decisions(&flown.simulation.staged().mission, &mut decisions)
+            .write_decisions(&flown.simulation.setup().mission, &mut decisions)
             .unwrap();
         (tlog, decisions)
     };
     let (first, second) = (files(), files());
     assert!(first.0.len() > 100_000 && !first.1.is_empty());
     assert!(first == second);
+}
+
+#[test]
+fn a_mission_on_px4_follows_the_same_rules() {
+    let plan = MissionPlan { autopilot: AutopilotKind::Px4, ..rd(4) };
+    let result = flown(plan, FlightScript::plain(0.0), Homeward);
+    let figures = result.figures();
+    assert!(figures.is_good(), "{:?} {:?} {}", figures.violations, texts(&result), result.waiting_for);
+    assert_eq!(figures.energy.0, 32.0);
+}
+
+#[test]
+fn a_take_over_on_px4_is_respected() {
+    let after = Duration::from_secs(20);
+    let incidents = vec![Incident { after, kind: IncidentKind::pilot_selects(VehicleMode::Hold) }];
+    let plan = MissionPlan { autopilot: AutopilotKind::Px4, ..rd(4) };
+    let result = flown(plan, FlightScript { incidents, ..FlightScript::plain(0.0) }, Homeward);
+    assert_eq!(result.figures().violations, [], "{:?}", texts(&result));
+    assert_eq!((result.ending, result.state), (Ending::TakenOver, Some(State::Passive)));
 }

@@ -1,4 +1,4 @@
-//! The radio channel: path loss, shadowing, noise, and what one slot carries.
+//! The radio channel: path loss, shadowing, noise, and the data of one slot.
 
 use crate::seed::{normal_pair, open_unit};
 use gleaner_units::{Db, Dbm, Metres};

@@ -1,4 +1,4 @@
-//! A city: building heights and who sees whom.
+//! A city: building heights and line of sight.
 
 use crate::generator;
 use crate::mirror::Mirror;
@@ -84,7 +84,7 @@ impl City {
         City::new(generator::heights(seed, City::CELL)).expect("streets are open and heights are capped")
     }
 
-    /// This city as a mirror shows it.
+    /// The mirror image of this city.
     #[must_use]
     pub fn mirrored(&self, mirror: Mirror) -> City {
         City::new(mirror.heights(&self.heights)).expect("a mirror image of a city is a city")
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_city_is_the_documented_one() {
+    fn the_default_city_has_the_documented_size() {
         let city = City::default_city();
         assert_eq!((city.grid().width(), city.grid().height()), (40, 30));
         assert_eq!(city.open_cells().len(), 706);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn cities_differ_in_their_fingerprint() {
+    fn fingerprints_differ_between_cities() {
         let city = City::default_city();
         let mut all: Vec<u64> = Mirror::ALL.map(|mirror| city.mirrored(mirror).fingerprint()).to_vec();
         all.extend((0..10).map(|seed| City::generate(seed).fingerprint()));

@@ -13,24 +13,24 @@ pub struct Device {
     pub initial_units: f32,
     /// D_t: its data now, data units; exactly 0 when it is empty.
     pub remaining_units: f32,
-    /// SNR_t: how strongly it is heard in the present slot.
+    /// SNR_t: SNR of its link in the present slot.
     pub snr: Db,
-    /// rho_t: whether that reaches the threshold. Says nothing about data being left.
+    /// rho_t: whether the SNR reaches the threshold, whether or not data is left.
     pub reachable: bool,
     row: u32,
 }
 
-/// What one slot brought.
+/// The transmission of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Serving {
     /// Index of the device that was served.
     pub device: usize,
-    /// What it sent, data units.
+    /// Data sent, data units.
     pub collected_units: f32,
 }
 
-/// The devices of one mission: what each still holds and how strongly it is heard. Flying is not its business, so
-/// it serves an episode on the grid and a simulated aircraft alike.
+/// The devices of one mission: remaining data and links. It does not know how the aircraft moves, so an episode on
+/// the grid and a simulated aircraft use the same field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
     devices: Vec<Device>,

@@ -5,7 +5,7 @@ use crate::{City, Mirror, Scenario, ScenarioError, Seed, Stream};
 use gleaner_units::{BatteryUnits, Cell};
 use rand::Rng;
 
-/// A device and what it holds when the mission begins.
+/// A device and its data at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Where it stands: an open cell.
@@ -33,7 +33,7 @@ const DRAWS: usize = 2000;
 const LAYOUTS: usize = 20;
 
 impl Realization {
-    /// A mission with devices of one's own choice, at any distance from each other.
+    /// A mission with the given devices, at any distance from each other.
     ///
     /// # Errors
     /// See [`ScenarioError`].
@@ -84,7 +84,7 @@ impl Realization {
         self.terminal
     }
 
-    /// What the battery holds at the start.
+    /// Battery at the start.
     #[must_use]
     pub const fn battery(&self) -> BatteryUnits {
         self.battery

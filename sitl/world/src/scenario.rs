@@ -1,4 +1,4 @@
-//! Scenarios: where a mission begins and ends, on which battery, among how many devices.
+//! Scenarios: start, terminal, battery and number of devices of a mission.
 
 use crate::City;
 use core::fmt;

@@ -1,9 +1,9 @@
-//! Seeds: the name of every random draw.
+//! Seeds of all random draws.
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Names the random draws of one realization or one episode.
+/// Seed of one realization or one episode.
 ///
 /// The number and the repeat are the key of a ChaCha generator with 8 rounds; what the draws are for is its
 /// stream number: training layout 0, slots 1, choices 2; evaluation layout 3, slots 4, choices 5; cities 6.
@@ -22,18 +22,18 @@ pub enum Stream {
     Layout,
     /// Shadowing and fading during the flight.
     Slots,
-    /// Whatever the one who flies draws: exploration, random paths.
+    /// Draws of the policy: exploration, random paths.
     Choices,
 }
 
 impl Seed {
-    /// For learning.
+    /// A seed for training.
     #[must_use]
     pub const fn training(number: u64) -> Seed {
         Seed { evaluation: false, number, repeat: 0 }
     }
 
-    /// For judging. Published figures use the numbers 0 to 99.
+    /// A seed for evaluation. Published figures use the numbers 0 to 99.
     #[must_use]
     pub const fn evaluation(number: u64) -> Seed {
         Seed { evaluation: true, number, repeat: 0 }

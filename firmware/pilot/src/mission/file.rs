@@ -22,7 +22,8 @@
 
 use crate::{DeviceSite, Mission, MissionError};
 use gleaner_guard::GuardError;
-use gleaner_units::{BatteryUnits, Cell, CellSet, CsvError, GeoPoint, GridFrame, HeightMap, Metres, Ned};
+use gleaner_units::city_file::{CityFileError, read_city};
+use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, GridFrame, HeightMap, Metres, Ned};
 use serde::{Deserialize, Serialize};
 use std::format;
 use std::string::String;
@@ -64,7 +65,7 @@ pub enum MissionFileError {
         /// The path as the mission file has it.
         path: String,
         /// Where and what.
-        fault: CsvError,
+        fault: CityFileError,
     },
 }
 
@@ -228,7 +229,8 @@ impl Reader<'_> {
             path: path.clone(),
             cause,
         })?;
-        HeightMap::from_csv(&csv, Metres(cell_m)).map_err(|fault| MissionFileError::City { path, fault })
+        let city = read_city(csv.as_bytes(), Metres(cell_m));
+        city.map(|city| city.heights).map_err(|fault| MissionFileError::City { path, fault })
     }
 
     fn degrees(&self, value: &Spanned<f64>, limit: f64) -> Result<i32, MissionFileError> {

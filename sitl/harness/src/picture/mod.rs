@@ -1,4 +1,4 @@
-//! `trajectory.svg`: the city from above, what was collected, and the way of the aircraft in the colours of time.
+//! `trajectory.svg`: the city from above, the collected data, and the aircraft's path coloured by time.
 
 mod symbols;
 
@@ -19,8 +19,8 @@ const TOP_PX: f32 = 84.0;
 const LEGEND_PX: f32 = 216.0;
 const BOTTOM_PX: f32 = 34.0;
 const FONT: &str = "Inter, 'Helvetica Neue', Arial, sans-serif";
-/// Pieces of the path with one colour each.
-const PIECES: usize = 96;
+/// Segments of the path, one colour each.
+const SEGMENTS: usize = 96;
 
 /// The drawing of one flight. `model` is the name under which the policy is shown.
 #[must_use]
@@ -38,7 +38,7 @@ struct Drawing<'s> {
 
 impl Drawing<'_> {
     fn new(simulation: &Simulation) -> Drawing<'_> {
-        let grid = simulation.staged().mission.grid();
+        let grid = simulation.setup().mission.grid();
         let journal = simulation.journal();
         Drawing {
             simulation,
@@ -91,7 +91,7 @@ impl Drawing<'_> {
     }
 
     fn city(&self) -> Group {
-        let heights = &self.simulation.staged().mission.heights;
+        let heights = &self.simulation.setup().mission.heights;
         let mut group = Group::new().add(
             Rectangle::new()
                 .set("x", LEFT_PX)
@@ -106,7 +106,7 @@ impl Drawing<'_> {
             if height_m == 0 {
                 continue;
             }
-            // Roofs a hair smaller than their cell, so that streets and lots can be told apart.
+            // A gap between roofs separates streets from lots.
             let building = Rectangle::new()
                 .set("x", self.x(f32::from(cell.x)) + 0.4)
                 .set("y", self.y(f32::from(cell.y) + 1.0) + 0.4)
@@ -127,7 +127,7 @@ impl Drawing<'_> {
             .filter(|point| point.at >= self.from)
             .map(|point| {
                 let (east_m, north_m) = self.simulation.on_grid(&point.position);
-                let cell_m = self.simulation.staged().mission.grid().cell().0;
+                let cell_m = self.simulation.setup().mission.grid().cell().0;
                 (self.time_share(point.at), self.x(east_m / cell_m), self.y(north_m / cell_m))
             })
             .collect();
@@ -142,7 +142,7 @@ impl Drawing<'_> {
                 .set("stroke-linejoin", "round")
         };
         let mut group = Group::new().add(line(&points, "#ffffff", 6.5));
-        let step = points.len().div_ceil(PIECES).max(1);
+        let step = points.len().div_ceil(SEGMENTS).max(1);
         for start in (0..points.len().saturating_sub(1)).step_by(step) {
             let piece = &points[start..(start + step + 1).min(points.len())];
             group = group.add(line(piece, &time_colour(piece[0].0), 3.4));
@@ -196,7 +196,7 @@ impl Drawing<'_> {
     }
 
     fn zones(&self) -> Group {
-        let realization = &self.simulation.staged().realization;
+        let realization = &self.simulation.setup().realization;
         let (start, terminal) = (realization.start(), realization.terminal());
         let mut group = Group::new();
         if start != terminal {
@@ -207,16 +207,16 @@ impl Drawing<'_> {
         group.add(zone(x, y, "#c62828", if start == terminal { "B" } else { "T" }))
     }
 
-    /// Where the first decision under a new preference was made, and what is to be said of it.
+    /// Where the first decision under a new preference was made, and its label.
     fn changes(&self) -> Vec<(Cell, String)> {
         let slots = self.simulation.journal().slots();
         let changed = slots.windows(2).filter(|pair| pair[0].record.w_data != pair[1].record.w_data);
-        let told = changed.map(|pair| {
+        let labels = changed.map(|pair| {
             let (before, after) = (pair[0].record.w_data, pair[1].record.w_data);
             let seconds = (pair[1].at - self.from).as_secs_f32();
             (pair[1].record.cell, format!("w {before:.2} \u{2192} {after:.2} at {seconds:.0} s"))
         });
-        told.collect()
+        labels.collect()
     }
 
     fn switches(&self) -> Group {
@@ -228,7 +228,7 @@ impl Drawing<'_> {
     }
 
     fn scale(&self) -> Group {
-        let cells = 100.0 / self.simulation.staged().mission.grid().cell().0;
+        let cells = 100.0 / self.simulation.setup().mission.grid().cell().0;
         let (x, y) = (LEFT_PX, TOP_PX + self.height_px + 16.0);
         let bar = Line::new()
             .set("x1", x)
@@ -266,7 +266,7 @@ impl Drawing<'_> {
             .add(label(x + 168.0, TOP_PX + 56.0, 12.0, QUIET, &clock(seconds)).set("text-anchor", "end"))
             .add(label(x, TOP_PX + 98.0, 13.0, INK, "Map").set("font-weight", 600));
         let same =
-            self.simulation.staged().realization.start() == self.simulation.staged().realization.terminal();
+            self.simulation.setup().realization.start() == self.simulation.setup().realization.terminal();
         let zones: &[(&str, &str, &str)] = match same {
             true => &[("#c62828", "B", "base: start and end")],
             false => &[("#0f9d58", "S", "start"), ("#c62828", "T", "terminal: lands here")],
@@ -303,7 +303,7 @@ impl Drawing<'_> {
     }
 
     fn legend_figures(&self, mut group: Group, x: f32, y: f32, figures: &Figures) -> Group {
-        let budget = self.simulation.staged().realization.battery();
+        let budget = self.simulation.setup().realization.battery();
         let rows = [
             ("Data collected", format!("{:.1} %", 100.0 * figures.collected)),
             ("Battery units", format!("{} of {}", figures.energy.0, budget.0)),
@@ -318,7 +318,7 @@ impl Drawing<'_> {
                     .set("font-weight", 700),
             );
         }
-        // As many as there is room for; the log has all.
+        // As many as fit; the log has all.
         for (index, (_, words)) in self.changes().into_iter().take(6).enumerate() {
             let y = line(rows.len() + index) + 14.0;
             let number = (index + 1).to_string();

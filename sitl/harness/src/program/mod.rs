@@ -1,11 +1,15 @@
-//! The program: what was typed, and what is done with it.
+//! The program: command line, tasks and their results.
 
+mod announce;
 mod arguments;
+mod city;
 mod fly;
-mod introduction;
+mod load;
 mod model;
+mod radio;
 mod results;
 mod serve;
+mod shrink;
 mod sweep;
 
 pub use arguments::Arguments;
@@ -15,7 +19,7 @@ use std::io;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Why the program could not do what was asked. Each says what to do.
+/// Why the program could not do its task. Each message says what to do.
 #[derive(Debug, Error)]
 pub enum ProgramError {
     /// No model.
@@ -40,21 +44,40 @@ pub enum ProgramError {
     /// The mission cannot be flown.
     #[error("{0}")]
     Flight(#[from] crate::FlightError),
+    /// A file cannot be read.
+    #[error("cannot read {path}: {source}")]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A city or mission file is wrong.
+    #[error("{path}: {cause}")]
+    Input {
+        /// Which file.
+        path: PathBuf,
+        /// Where and what.
+        cause: String,
+    },
+    /// A file cannot be imported.
+    #[error("{0}")]
+    Import(#[from] crate::city::ImportError),
     /// A port cannot be opened.
     #[error("{0}")]
     Port(gleaner_ports::PortError),
-    /// The system does not let us hear an interrupt.
+    /// The system delivers no interrupt.
     #[error("cannot listen for an interrupt: {0}: run it in the foreground of a terminal")]
     Signals(io::Error),
-    /// Nobody reads what we print.
+    /// The standard output is closed.
     #[error("cannot print: {0}: give it a standard output")]
     Stdout(io::Error),
     /// The operating system does not wait for a connection.
     #[error("cannot wait for a connection: {0}: free some memory, or file descriptors")]
     Wait(io::Error),
-    /// No board came.
+    /// No board connected.
     #[error("no board has connected for {0} s: start it, or correct --board")]
-    NobodyConnects(u64),
+    NoBoard(u64),
     /// A result cannot be written.
     #[error("cannot write {path}: {source}: choose another folder with --out")]
     Write {
@@ -65,14 +88,16 @@ pub enum ProgramError {
     },
 }
 
-/// Does what was asked; whether it went well.
+/// Runs the task; whether its result is good.
 ///
 /// # Errors
-/// It could not be done at all.
+/// The task could not be done.
 pub fn run(arguments: Arguments) -> Result<bool, ProgramError> {
     match arguments.task() {
         Task::Fly(order) => fly::fly(&order),
         Task::Serve(order) => serve::serve(&order),
         Task::Sweep(order) => sweep::sweep(&order),
+        Task::City(order) => city::city(&order),
+        Task::Radio(order) => radio::radio(&order),
     }
 }

@@ -1,7 +1,7 @@
-//! Finding and loading the model.
+//! Loading the model.
 
 use super::ProgramError;
-use super::results::Brain;
+use super::results::PolicyInfo;
 use gleaner_policy::{Engine, EngineKind};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -9,7 +9,7 @@ use std::path::Path;
 /// The shipped model, part of the program: a copied binary flies.
 const SHIPPED: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/gleaner.onnx"));
 
-/// Loads the model and lets it prove itself.
+/// Loads the model and runs its self-test.
 pub(super) fn load(path: Option<&Path>, engine: EngineKind) -> Result<Engine, ProgramError> {
     let Some(path) = path.map(Path::to_owned) else {
         let unfit = |source| ProgramError::Model { path: "built in".into(), source };
@@ -22,8 +22,11 @@ pub(super) fn load(path: Option<&Path>, engine: EngineKind) -> Result<Engine, Pr
     Engine::load_checked(&bytes, engine).map_err(|source| ProgramError::Model { path, source })
 }
 
-/// How a model is called in summaries: its name, its version and the beginning of its hash.
-pub(super) fn brain(policy: &Engine) -> Brain {
+/// Name, version, the beginning of the hash, and engine.
+pub(super) fn info(policy: &Engine) -> PolicyInfo {
     let hash: String = policy.sha256().chars().take(12).collect();
-    Brain { model: format!("{} {} ({hash})", policy.name(), policy.version()), engine: policy.kind().name() }
+    PolicyInfo {
+        model: format!("{} {} ({hash})", policy.name(), policy.version()),
+        engine: policy.kind().name(),
+    }
 }

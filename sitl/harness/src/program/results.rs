@@ -1,4 +1,4 @@
-//! What a flight leaves behind: figures for a human, figures for a program, files.
+//! The results of a flight: figures as text and as JSON, and files.
 
 use super::ProgramError;
 use crate::picture;
@@ -8,19 +8,19 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// What decides in a flight, as far as it is known here.
+/// The policy of a flight, as far as it is known here.
 #[derive(Clone, Debug)]
-pub(super) struct Brain {
-    /// The model's name, version and hash, or whose it is.
+pub(super) struct PolicyInfo {
+    /// The model's name, version and hash, or where it runs.
     pub model: String,
-    /// What the model runs in.
+    /// The engine that runs the model.
     pub engine: &'static str,
 }
 
-impl Brain {
-    /// A pilot that is not in this process and brings its own.
-    pub fn of(whom: &'static str) -> Brain {
-        Brain { model: format!("of the {whom}"), engine: whom }
+impl PolicyInfo {
+    /// The policy of a pilot outside this process.
+    pub fn outside(place: &'static str) -> PolicyInfo {
+        PolicyInfo { model: format!("of the {place}"), engine: place }
     }
 }
 
@@ -47,7 +47,7 @@ pub(super) fn write_files(
     folder: &Path,
     simulation: &Simulation,
     figures: &Figures,
-    brain: &Brain,
+    model: &str,
 ) -> Result<PathBuf, ProgramError> {
     let fail = |path: &Path| {
         let path = path.to_owned();
@@ -65,14 +65,14 @@ pub(super) fn write_files(
     };
     let journal = simulation.journal();
     write("flight.tlog", &|out| journal.write_tlog(out))?;
-    write("decisions.jsonl", &|out| journal.write_decisions(&simulation.staged().mission, out))?;
-    let picture = picture::trajectory(simulation, figures, &brain.model);
+    write("decisions.jsonl", &|out| journal.write_decisions(&simulation.setup().mission, out))?;
+    let picture = picture::trajectory(simulation, figures, model);
     let path = write("trajectory.svg", &|out| out.write_all(picture.as_bytes()))?;
     Ok(path.canonicalize().unwrap_or(path))
 }
 
 /// One JSON object.
-pub(super) fn json(figures: &Figures, brain: &Brain, wall_s: f64) -> String {
+pub(super) fn json(figures: &Figures, policy: &PolicyInfo, wall_s: f64) -> String {
     let report = Report {
         scenario: figures.scenario.name(),
         seed: figures.seed,
@@ -84,8 +84,8 @@ pub(super) fn json(figures: &Figures, brain: &Brain, wall_s: f64) -> String {
         landed: figures.landed,
         violations: figures.violations.len(),
         switches: figures.switches,
-        model: &brain.model,
-        engine: brain.engine,
+        model: &policy.model,
+        engine: policy.engine,
         wall_s,
     };
     // Serialising cannot fail: every key is a string.
@@ -96,16 +96,16 @@ pub(super) fn json(figures: &Figures, brain: &Brain, wall_s: f64) -> String {
 pub(super) fn summary(
     simulation: &Simulation,
     figures: &Figures,
-    brain: &Brain,
+    policy: &PolicyInfo,
 ) -> Vec<(&'static str, String)> {
     let scenario = figures.scenario.name().to_uppercase();
     let (seed, devices, preference) = (figures.seed, figures.devices, figures.preference);
-    let budget = simulation.staged().realization.battery().0;
+    let budget = simulation.setup().realization.battery().0;
     let flight_s =
         simulation.journal().slots().first().map_or(0.0, |slot| (simulation.now() - slot.at).as_secs_f32());
     vec![
         ("mission", format!("{scenario}, seed {seed}, {devices} devices, w_data {preference}")),
-        ("policy", format!("{}, engine {}", brain.model, brain.engine)),
+        ("policy", format!("{}, engine {}", policy.model, policy.engine)),
         ("collected", format!("{:.1} % of the data", 100.0 * figures.collected)),
         ("energy", format!("{} of {budget} battery units", figures.energy.0)),
         ("decisions", format!("{} in {flight_s:.0} s of flight", figures.decisions)),
@@ -119,7 +119,7 @@ pub(super) fn print(lines: &[(&'static str, String)], figures: &Figures, wall_s:
     }
     println!("{:<12} {}", "violations", figures.violations.len());
     for violation in &figures.violations {
-        println!("  {:8.1} s  {}", violation.at.as_micros() as f64 * 1e-6, violation.breach);
+        println!("  {:8.1} s  {}", violation.at.as_micros() as f64 * 1e-6, violation.rule);
     }
     println!("{:<12} {wall_s:.2} s", "wall time");
     println!("{:<12} {}", "picture", picture.display());

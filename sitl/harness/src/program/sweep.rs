@@ -1,79 +1,88 @@
 //! `sweep`: many flights in virtual time, each with incidents of its own.
 
 use super::arguments::SweepOrder;
-use super::results::{self, Brain};
+use super::results;
+use super::shrink::{self, Failure};
 use super::{ProgramError, model};
-use crate::{Ending, FlightError, Flown, Incident, Staged, Trial, Wishes};
+use crate::{AutopilotKind, Ending, FlightError, FlightResult, MissionSetup, Trial};
 use gleaner_policy::Engine;
 use gleaner_world::World;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
-/// What `--json` prints.
+/// The report; `--json` prints it.
 #[derive(Serialize)]
 struct Report {
+    autopilot: &'static str,
     first: u64,
     flights: u64,
     model: String,
     engine: &'static str,
-    /// By what happened.
-    rows: BTreeMap<String, Row>,
-    /// What should not have been.
+    /// By fault class.
+    rows: BTreeMap<&'static str, Row>,
+    /// Flights that broke a rule.
     findings: Vec<Finding>,
 }
 
-/// How flights ended.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-struct Row {
-    flights: u64,
-    /// On the terminal, by the pilot on board.
-    landed: u64,
-    /// The human pilot has the aircraft.
-    taken_over: u64,
-    /// On the ground elsewhere: handed back to the autopilot, or brought home by the human pilot.
-    elsewhere: u64,
-    /// Never engaged, or still in the air when the simulation gave up.
-    stuck: u64,
-    /// With a rule broken, or stuck.
-    findings: u64,
+/// How the flights of a fault class ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Row {
+    pub flights: u64,
+    /// Landed on the terminal under the pilot's command.
+    pub completed: u64,
+    /// On the ground elsewhere: brought back by the autopilot or by the human pilot.
+    pub returned: u64,
+    /// In the air in the hands of the human pilot or another station.
+    pub handed_back: u64,
+    /// With a broken rule, or without an end.
+    pub violations: u64,
 }
 
-/// A flight with a rule broken, or without an end.
+/// A flight with a broken rule, or without an end.
 #[derive(Clone, Debug, Serialize)]
 struct Finding {
     flight: u64,
     incidents: Vec<String>,
-    what: Vec<String>,
+    faults: Vec<String>,
+    /// The command that repeats the flight.
+    replay: String,
+    /// The command that repeats it with fewer incidents, if fewer suffice.
+    smaller: Option<String>,
 }
 
-/// One flight, judged.
 struct Judged {
     number: u64,
-    incidents: String,
+    class: &'static str,
     row: Row,
     finding: Option<Finding>,
 }
 
 pub(super) fn sweep(order: &SweepOrder) -> Result<bool, ProgramError> {
-    let brain = model::brain(&model::load(order.model.as_deref(), order.engine)?);
-    let mut flown = fly_all(order, &brain)?;
-    flown.sort_by_key(|judged| judged.number);
-    let mut rows = BTreeMap::<String, Row>::new();
-    for judged in &flown {
-        rows.entry(judged.incidents.clone()).or_default().add(judged.row);
+    let policy = model::info(&model::load(order.model.as_deref(), order.engine)?);
+    let mut judged = fly_all(order)?;
+    judged.sort_by_key(|judged| judged.number);
+    let mut rows = BTreeMap::<&'static str, Row>::new();
+    for judged in &judged {
+        rows.entry(judged.class).or_default().add(judged.row);
     }
     let report = Report {
+        autopilot: order.autopilot.name(),
         first: order.first,
         flights: order.flights,
-        model: brain.model,
-        engine: brain.engine,
+        model: policy.model,
+        engine: policy.engine,
         rows,
-        findings: flown.into_iter().filter_map(|judged| judged.finding).collect(),
+        findings: judged.into_iter().filter_map(|judged| judged.finding).collect(),
     };
+    if let Some(path) = &order.table {
+        std::fs::write(path, table(order.autopilot, order.first, order.flights, &report.rows))
+            .map_err(|source| ProgramError::Write { path: path.clone(), source })?;
+    }
     if order.json {
         // Serialising cannot fail: every key is a string.
         println!("{}", serde_json::to_string(&report).unwrap_or_default());
@@ -84,7 +93,7 @@ pub(super) fn sweep(order: &SweepOrder) -> Result<bool, ProgramError> {
 }
 
 /// Flies on all cores; a flight is the same on any number of them.
-fn fly_all(order: &SweepOrder, brain: &Brain) -> Result<Vec<Judged>, ProgramError> {
+fn fly_all(order: &SweepOrder) -> Result<Vec<Judged>, ProgramError> {
     let world = Arc::new(World::default_world());
     let bar = ProgressBar::new(order.flights);
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} flights, {eta} left {msg}");
@@ -92,24 +101,24 @@ fn fly_all(order: &SweepOrder, brain: &Brain) -> Result<Vec<Judged>, ProgramErro
     let done = AtomicU64::new(0);
     let worker = || -> Result<Vec<Judged>, ProgramError> {
         let mut policy = model::load(order.model.as_deref(), order.engine)?;
-        let mut flown = Vec::new();
+        let mut judged = Vec::new();
         loop {
             let index = done.fetch_add(1, Ordering::Relaxed);
             if index >= order.flights {
-                return Ok(flown);
+                return Ok(judged);
             }
-            let judged = fly(order, &world, order.first + index, &mut policy, brain)
-                // The others need not go on for nothing.
+            let one = judge(order, &world, order.first + index, &mut policy)
+                // An error ends the other workers too.
                 .inspect_err(|_| done.store(order.flights, Ordering::Relaxed))?;
-            if let Some(finding) = &judged.finding {
-                bar.set_message(format!("(last finding: flight {})", finding.flight));
+            if let Some(finding) = &one.finding {
+                bar.set_message(format!("(last violation: flight {})", finding.flight));
             }
-            flown.push(judged);
+            judged.push(one);
             bar.inc(1);
         }
     };
-    let workers = thread::available_parallelism().map_or(1, usize::from);
-    let flown = thread::scope(|scope| {
+    let workers = order.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
+    let judged = thread::scope(|scope| {
         let workers: Vec<_> = (0..workers).map(|_| scope.spawn(worker)).collect();
         let results = workers
             .into_iter()
@@ -117,101 +126,143 @@ fn fly_all(order: &SweepOrder, brain: &Brain) -> Result<Vec<Judged>, ProgramErro
         results.collect::<Result<Vec<_>, _>>()
     })?;
     bar.finish_and_clear();
-    Ok(flown.into_iter().flatten().collect())
+    Ok(judged.into_iter().flatten().collect())
 }
 
-fn fly(
+fn judge(
     order: &SweepOrder,
     world: &Arc<World>,
     number: u64,
     policy: &mut Engine,
-    brain: &Brain,
 ) -> Result<Judged, ProgramError> {
-    let Trial { plan, wishes } = Trial::draw(number, order.calm);
-    let staged = Staged::new(Arc::clone(world), plan).map_err(FlightError::from)?;
-    let flown = crate::fly(staged, wishes, policy, Ok(()))?;
-    let what = faults(&flown);
-    let finding =
-        (!what.is_empty()).then(|| Finding { flight: number, incidents: told(&flown.wishes), what });
-    if finding.is_some() || order.keep {
-        let folder = order.out.join(format!("flight-{number}"));
-        results::write_files(&folder, &flown.simulation, &flown.figures(), brain)?;
+    let mut trial = Trial::draw(number, order.autopilot, order.calm);
+    if let Some(kept) = &order.incidents {
+        trial = trial.with_incidents(kept);
     }
-    Ok(Judged { number, incidents: kinds(&flown.wishes), row: Row::of(&flown, finding.is_some()), finding })
+    let mut fly = |trial: &Trial| -> Result<FlightResult, ProgramError> {
+        let setup = MissionSetup::new(Arc::clone(world), trial.plan).map_err(FlightError::from)?;
+        Ok(crate::fly(setup, trial.script.clone(), &mut *policy, Ok(()))?)
+    };
+    let result = fly(&trial)?;
+    let faults = faults(&result);
+    let row = Row::of(&result, !faults.is_empty());
+    let class = trial.class();
+    if order.keep || !faults.is_empty() {
+        let folder = order.out.join(format!("flight-{number}"));
+        results::write_files(&folder, &result.simulation, &result.figures(), "gleaner")?;
+    }
+    if faults.is_empty() {
+        return Ok(Judged { number, class, row, finding: None });
+    }
+    let kept = match order.incidents {
+        Some(_) => None,
+        None => shrink::smallest(&trial, |trial| Ok::<_, ProgramError>(failure(&fly(trial)?)))?,
+    };
+    let finding = Finding {
+        flight: number,
+        incidents: trial
+            .script
+            .incidents
+            .iter()
+            .enumerate()
+            .map(|(i, incident)| {
+                format!(
+                    "[{i}] {:.0} s after the first decision: {}",
+                    incident.after.as_secs_f32(),
+                    incident.kind
+                )
+            })
+            .collect(),
+        faults,
+        replay: order.replay(number, order.incidents.as_deref()),
+        smaller: kept.map(|kept| order.replay(number, Some(&kept))),
+    };
+    Ok(Judged { number, class, row, finding: Some(finding) })
 }
 
-/// What of a flight should not have been, each with its time.
-fn faults(flown: &Flown) -> Vec<String> {
-    let violations = flown.simulation.referee().violations().iter();
+/// The kind of failure, to compare flights with.
+fn failure(result: &FlightResult) -> Option<Failure> {
+    let rule = result.simulation.referee().violations().first();
+    match (rule, result.ending) {
+        (Some(violation), _) => Some(Failure::Rule(std::mem::discriminant(&violation.rule))),
+        (None, Ending::NeverEngaged | Ending::TimeUp) => Some(Failure::NoEnd),
+        (None, _) => None,
+    }
+}
+
+/// Broken rules with their times, and a flight that did not end.
+fn faults(result: &FlightResult) -> Vec<String> {
+    let violations = result.simulation.referee().violations().iter();
     let mut faults: Vec<String> = violations
-        .map(|violation| format!("{:.1} s: {}", violation.at.as_micros() as f64 * 1e-6, violation.breach))
+        .map(|violation| format!("{:.1} s: {}", violation.at.as_micros() as f64 * 1e-6, violation.rule))
         .collect();
-    match flown.ending {
-        Ending::NeverEngaged => faults.push(format!("never engaged, waiting for {}", flown.waiting_for)),
-        Ending::TimeUp => faults.push("still in the air when the time was up".into()),
+    match result.ending {
+        Ending::NeverEngaged => faults.push(format!("never engaged, waiting for {}", result.waiting_for)),
+        Ending::TimeUp => faults.push("still in the air at the time limit".into()),
         Ending::OnTheGround | Ending::TakenOver | Ending::PilotGone => {}
     }
     faults
 }
 
-/// The kinds of incidents: the row of a flight.
-fn kinds(wishes: &Wishes) -> String {
-    let mut names: Vec<&str> = wishes.incidents.iter().map(|incident| incident.kind.name()).collect();
-    names.dedup();
-    match names[..] {
-        [] => "none".into(),
-        [one] => one.into(),
-        _ => "several".into(),
-    }
-}
-
-fn told(wishes: &Wishes) -> Vec<String> {
-    let told = |incident: &Incident| {
-        format!("{:.0} s after the first decision {}", incident.after.as_secs_f32(), incident.kind)
+/// The table of fault classes as a snapshot: it changes only when a flight ends differently.
+pub(crate) fn table(
+    autopilot: AutopilotKind,
+    first: u64,
+    flights: u64,
+    rows: &BTreeMap<&'static str, Row>,
+) -> String {
+    let mut text = format!("autopilot {autopilot}, flights {first} to {}\n\n", first + flights - 1);
+    text.push_str("fault class         flights  completed  returned  handed back  violations\n");
+    let mut sum = Row::default();
+    let mut line = |class: &str, row: Row| {
+        let Row { flights, completed, returned, handed_back, violations } = row;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{class:<18} {flights:>8}  {completed:>9}  {returned:>8}  {handed_back:>11}  {violations:>10}"
+        );
     };
-    wishes.incidents.iter().map(told).collect()
+    for (class, row) in rows {
+        line(class, *row);
+        sum.add(*row);
+    }
+    line("all", sum);
+    text
 }
 
 impl Row {
-    fn of(flown: &Flown, is_finding: bool) -> Row {
-        let landed = flown.simulation.referee().landed();
-        let ended = |endings: &[Ending]| u64::from(!landed && endings.contains(&flown.ending));
+    fn of(result: &FlightResult, violated: bool) -> Row {
+        let landed = result.simulation.referee().landed();
+        let ended = |ending: Ending| u64::from(!landed && result.ending == ending);
         Row {
             flights: 1,
-            landed: u64::from(landed),
-            taken_over: ended(&[Ending::TakenOver]),
-            elsewhere: ended(&[Ending::OnTheGround]),
-            stuck: ended(&[Ending::NeverEngaged, Ending::TimeUp, Ending::PilotGone]),
-            findings: u64::from(is_finding),
+            completed: u64::from(landed),
+            returned: ended(Ending::OnTheGround),
+            handed_back: ended(Ending::TakenOver),
+            violations: u64::from(violated),
         }
     }
 
     fn add(&mut self, other: Row) {
         self.flights += other.flights;
-        self.landed += other.landed;
-        self.taken_over += other.taken_over;
-        self.elsewhere += other.elsewhere;
-        self.stuck += other.stuck;
-        self.findings += other.findings;
+        self.completed += other.completed;
+        self.returned += other.returned;
+        self.handed_back += other.handed_back;
+        self.violations += other.violations;
     }
 }
 
 impl Report {
     fn print(&self, order: &SweepOrder) {
         println!("policy {}, engine {}", self.model, self.engine);
-        println!("incidents          flights   landed  taken over  elsewhere    stuck  findings");
-        for (incidents, row) in &self.rows {
-            let Row { flights, landed, taken_over, elsewhere, stuck, findings } = row;
-            println!(
-                "{incidents:<18} {flights:>7}  {landed:>7}  {taken_over:>10}  {elsewhere:>9}  {stuck:>7}  {findings:>8}"
-            );
-        }
-        for Finding { flight, incidents, what } in &self.findings {
-            println!(
-                "\nflight {flight} (again: gleaner-sitl sweep --first {flight} --flights 1{})",
-                order.same()
-            );
-            incidents.iter().chain(what).for_each(|line| println!("  {line}"));
+        print!("{}", table(order.autopilot, self.first, self.flights, &self.rows));
+        for Finding { flight, incidents, faults, replay, smaller } in &self.findings {
+            println!("\nflight {flight}");
+            incidents.iter().chain(faults).for_each(|line| println!("  {line}"));
+            println!("  replay: {replay}");
+            if let Some(smaller) = smaller {
+                println!("  fewer incidents: {smaller}");
+            }
         }
         if !self.findings.is_empty() {
             println!("\nlogs and pictures of these flights are in {}", order.out.display());
@@ -222,7 +273,7 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{IncidentKind, MissionPlan};
+    use crate::{AircraftFault, FlightScript, Incident, IncidentKind, MissionPlan};
     use gleaner_policy::{Attention, Inference, Policy, Tokens};
     use gleaner_units::{BatteryUnits, Duration};
     use gleaner_world::ScenarioKind;
@@ -237,30 +288,31 @@ mod tests {
     }
 
     /// Hovers in RD; after ten seconds the pack loses so many units.
-    fn flown(lost: f32) -> Flown {
+    fn hovering(lost: f32) -> FlightResult {
         let plan = MissionPlan::new(ScenarioKind::ReachDestination, 4);
-        let staged = Staged::new(Arc::new(World::default_world()), plan).unwrap();
-        let kind = IncidentKind::LosesBattery(BatteryUnits(lost));
+        let setup = MissionSetup::new(Arc::new(World::default_world()), plan).unwrap();
+        let kind = IncidentKind::Aircraft(AircraftFault::ChargeLost(BatteryUnits(lost)));
         let incidents = vec![Incident { after: Duration::from_secs(10), kind }];
-        crate::fly(staged, Wishes { incidents, ..Wishes::plain(1.0) }, Hover, Ok(())).unwrap()
+        crate::fly(setup, FlightScript { incidents, ..FlightScript::plain(1.0) }, Hover, Ok(())).unwrap()
     }
 
     #[test]
-    fn a_flight_that_nobody_could_bring_home_is_a_finding() {
-        let flown = flown(90.0);
-        let what = faults(&flown);
-        assert!(what.iter().any(|line| line.contains("the battery is empty in flight")), "{what:?}");
-        let row = Row::of(&flown, true);
-        assert_eq!((row.flights, row.findings), (1, 1));
-        assert_eq!(kinds(&flown.wishes), "charge lost");
-        assert_eq!(told(&flown.wishes), ["10 s after the first decision the pack loses 90 battery units"]);
+    fn a_good_flight_is_completed_without_violations() {
+        let result = hovering(0.0);
+        assert_eq!(faults(&result), [""; 0]);
+        let row = Row::of(&result, false);
+        assert_eq!((row.completed, row.returned, row.handed_back, row.violations), (1, 0, 0, 0));
     }
 
     #[test]
-    fn a_good_flight_is_none() {
-        let flown = flown(0.0);
-        assert_eq!(faults(&flown), [""; 0]);
-        let row = Row::of(&flown, false);
-        assert_eq!((row.landed, row.taken_over, row.elsewhere, row.stuck, row.findings), (1, 0, 0, 0, 0));
+    fn the_table_lists_classes_and_their_sum() {
+        let row = Row { flights: 3, completed: 2, returned: 1, ..Row::default() };
+        let rows = BTreeMap::from([("delay", row), ("none", row)]);
+        let text = table(AutopilotKind::Px4, 7, 6, &rows);
+        assert!(text.starts_with("autopilot px4, flights 7 to 12\n"), "{text}");
+        assert!(
+            text.ends_with("all                       6          4         2            0           0\n"),
+            "{text}"
+        );
     }
 }

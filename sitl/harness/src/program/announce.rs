@@ -1,13 +1,13 @@
-//! What is said and written before a flight with somebody outside: the ports and the mission.
+//! Before a flight with a pilot outside this process: the ports and the mission file.
 
 use super::ProgramError;
-use crate::Staged;
+use crate::MissionSetup;
 use gleaner_pilot::mission_file;
 use gleaner_ports::{Endpoint, Port};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Prints one line per endpoint, with the port that the system chose where it was asked to, and where the mission is.
+/// Prints one line per endpoint, with the port number that the system chose for port 0, and the mission file.
 pub(super) fn ports(
     roles: &[(&str, Option<&Port>)],
     onboard: Option<&str>,
@@ -29,7 +29,7 @@ pub(super) fn ports(
     out.flush().map_err(ProgramError::Stdout)
 }
 
-/// The endpoint with the port number that is really bound.
+/// The endpoint with the bound port number.
 fn endpoint(port: &Port) -> String {
     match (port.endpoint(), port.local_address()) {
         (Endpoint::UdpIn(_), Some(address)) => format!("udpin:{address}"),
@@ -38,14 +38,14 @@ fn endpoint(port: &Port) -> String {
     }
 }
 
-/// Writes the mission file that a pilot outside needs, and the city next to it.
-pub(super) fn write_mission(staged: &Staged, path: &Path) -> Result<(), ProgramError> {
+/// Writes the mission file that the pilot needs, and the city beside it.
+pub(super) fn write_mission(setup: &MissionSetup, path: &Path) -> Result<(), ProgramError> {
     let city = path.with_extension("city.csv");
     let name = city.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let fail = |path: &Path| {
         let path = path.to_owned();
         move |source| ProgramError::Write { path, source }
     };
-    std::fs::write(&city, staged.world.city().to_csv()).map_err(fail(&city))?;
-    std::fs::write(path, mission_file::write(&staged.mission, &name)).map_err(fail(path))
+    std::fs::write(&city, setup.world.city().to_csv()).map_err(fail(&city))?;
+    std::fs::write(path, mission_file::write(&setup.mission, &name)).map_err(fail(path))
 }

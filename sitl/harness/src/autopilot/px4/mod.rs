@@ -1,0 +1,248 @@
+//! A simulated PX4 1.18, after measurements on its own simulator (SIH quadrotor).
+//!
+//! # What is reproduced
+//! - **Streams** come unasked on the companion link: position 30 Hz, attitude 100 Hz, power and landed state 5 Hz, GNSS
+//!   8 Hz, battery and home 0.5 Hz. `SET_MESSAGE_INTERVAL` changes a rate. Texts go to the ground link only.
+//! - **Heartbeat** at 1 Hz only: a mode change is seen up to a second late.
+//! - **OFFBOARD** needs a stream of position targets. In the air without one, `DO_SET_MODE` is TEMPORARILY_REJECTED;
+//!   disarmed it is ACCEPTED.
+//! - **Loss of the stream** for `COM_OF_LOSS_T` leaves OFFBOARD for RTL (HOLD with `COM_OBL_RC_ACT` 5) with a
+//!   failsafe. **When targets resume, it returns to OFFBOARD by itself.** After a mode change by the pilot it does not;
+//!   `DO_SET_MODE` OFFBOARD is accepted then too.
+//! - **Battery failsafe**: low 15 % warns, critical 7 % returns, emergency 5 % lands (`COM_LOW_BAT_ACT` 3).
+//! - **NAV_TAKEOFF** takes the altitude above mean sea level, climbs in TAKEOFF and ends in HOLD.
+//! - **DO_CHANGE_SPEED** is ACCEPTED and has no effect in OFFBOARD; `MPC_XY_VEL_MAX` has. The heading is kept.
+//! - **Targets**: frame 9 is reported as unsupported and holds; NaN on an axis leaves the axis uncontrolled, and the
+//!   aircraft drifts.
+//! - **Integer parameters** travel as the raw bits of an int32 in the float field.
+//! - **After landing** it stays in the mode in which it landed, disarmed; in OFFBOARD without a stream it refuses to
+//!   arm.
+
+mod commands;
+mod modes;
+mod telemetry;
+#[cfg(test)]
+mod tests;
+
+use super::airframe::Airframe;
+use super::guidance::{Guidance, Profile};
+use super::motion::{Response, SpeedLimits};
+use super::parameters::{Defaults, ParameterTable};
+use super::ports::Ports;
+use super::{AircraftFault, AircraftSettings, Autopilot, Commander, LinkId, Truth, VehicleMode};
+use gleaner_units::{Duration, Instant};
+use mavlink::dialects::ardupilotmega::MavParamType::{
+    MAV_PARAM_TYPE_INT32 as I32, MAV_PARAM_TYPE_REAL32 as F32,
+};
+use mavlink::dialects::ardupilotmega::MavSeverity;
+
+/// Defaults of PX4 1.18 on its SIH quadrotor.
+pub(super) const DEFAULTS: Defaults = &[
+    ("MAV_SYS_ID", 1.0, I32),
+    ("COM_OF_LOSS_T", 1.0, F32),
+    ("COM_OBL_RC_ACT", 0.0, I32),
+    ("COM_LOW_BAT_ACT", 3.0, I32),
+    ("BAT_LOW_THR", 0.15, F32),
+    ("BAT_CRIT_THR", 0.07, F32),
+    ("BAT_EMERGEN_THR", 0.05, F32),
+    ("MPC_XY_VEL_MAX", 12.0, F32),
+    ("MPC_Z_VEL_MAX_UP", 3.1, F32),
+    ("MPC_Z_VEL_MAX_DN", 1.5, F32),
+    ("MPC_LAND_SPEED", 0.65, F32),
+    ("MPC_LAND_ALT2", 12.0, F32),
+    ("RTL_RETURN_ALT", 60.0, F32),
+    ("RTL_LAND_DELAY", 0.0, F32),
+    ("COM_DISARM_PRFLT", 10.0, F32),
+    ("GF_ACTION", 2.0, I32),
+    ("GF_MAX_HOR_DIST", 0.0, F32),
+];
+
+/// From power on to the first heartbeat after a reboot.
+const BOOT_TIME: Duration = Duration::from_secs(3);
+/// From the take-off command to leaving the ground: 30.3 s to 60 m were measured.
+const SPIN_UP: Duration = Duration::from_millis(6_300);
+/// Ground speed never exceeded 10.1 m/s on a leg of 200 m, with `MPC_XY_VEL_MAX` 12.
+const FASTEST_LEG_MPS: f64 = 10.1;
+
+/// Parameters in the units that the simulation needs, kept beside the table so that a tick looks nothing up.
+#[derive(Clone, Copy, Debug)]
+struct Tuning {
+    profile: Profile,
+    loss_time: Duration,
+    loss_action: u32,
+    battery_levels: [f64; 3],
+    battery_action: u32,
+    disarm_delay: Duration,
+    fence_radius_m: f64,
+}
+
+/// The simulated autopilot with its aircraft.
+#[derive(Debug)]
+pub(crate) struct Px4 {
+    /// The last boot, on the clock that [`Autopilot::step`] is given.
+    booted_at: Instant,
+    now: Instant,
+    up_from: Instant,
+    ports: Ports,
+    parameters: ParameterTable,
+    tuning: Tuning,
+    airframe: Airframe,
+    mode: VehicleMode,
+    mode_by: Commander,
+    guidance: Guidance,
+    armed: bool,
+    armed_at: Instant,
+    /// The last position target of any kind, and the companion's or a ground station's.
+    target_at: Option<Instant>,
+    /// OFFBOARD was left because the targets stopped: resuming targets bring it back.
+    offboard_lost: bool,
+    /// A failsafe is active, reported by the heartbeat.
+    failsafe: bool,
+    next_heartbeat: Instant,
+    ignored_targets: u32,
+}
+
+impl Px4 {
+    /// An autopilot at boot, on the ground, in HOLD.
+    pub fn new(settings: AircraftSettings) -> Px4 {
+        let mut parameters = ParameterTable::new(DEFAULTS);
+        parameters.set("MAV_SYS_ID", f32::from(settings.system_id));
+        Px4::boot(Airframe::new(settings, Response::PX4), parameters)
+    }
+
+    fn boot(airframe: Airframe, parameters: ParameterTable) -> Px4 {
+        let tuning = tuning(&parameters);
+        let mut px4 = Px4 {
+            booted_at: Instant::ZERO,
+            now: Instant::ZERO,
+            up_from: Instant::ZERO,
+            ports: Ports::new(airframe.settings.system_id, telemetry::STREAMABLE),
+            parameters,
+            tuning,
+            airframe,
+            mode: VehicleMode::Hold,
+            mode_by: Commander::Autopilot,
+            guidance: Guidance::Halt,
+            armed: false,
+            armed_at: Instant::ZERO,
+            target_at: None,
+            offboard_lost: false,
+            failsafe: false,
+            next_heartbeat: Instant::ZERO,
+            ignored_targets: 0,
+        };
+        px4.start_streams();
+        px4
+    }
+
+    fn reboot(&mut self) {
+        let settings = self.airframe.settings;
+        // Swapped out only to move its parts into the next boot.
+        let before = std::mem::replace(self, Px4::new(settings));
+        *self = Px4 {
+            booted_at: before.booted_at + (before.now - Instant::ZERO),
+            up_from: Instant::ZERO + BOOT_TIME,
+            next_heartbeat: Instant::ZERO + BOOT_TIME,
+            ignored_targets: before.ignored_targets,
+            ..Px4::boot(before.airframe.rebooted(), before.parameters)
+        };
+    }
+
+    fn set_own_parameter(&mut self, name: &str, value: f32) -> Option<usize> {
+        let index = self.parameters.set(name, value)?;
+        self.tuning = tuning(&self.parameters);
+        Some(index)
+    }
+
+    /// `STATUSTEXT`: none reached the companion link in measured runs.
+    fn say(&mut self, severity: MavSeverity, text: &str) {
+        self.ports.say(&[LinkId::GROUND, LinkId::CREW], severity, text);
+    }
+}
+
+fn tuning(parameters: &ParameterTable) -> Tuning {
+    let seconds = |name| Duration::from_secs_f32(parameters.value(name) as f32);
+    Tuning {
+        profile: Profile {
+            limits: SpeedLimits {
+                horizontal_mps: parameters.value("MPC_XY_VEL_MAX").min(FASTEST_LEG_MPS),
+                up_mps: parameters.value("MPC_Z_VEL_MAX_UP"),
+                down_mps: parameters.value("MPC_Z_VEL_MAX_DN"),
+            },
+            spin_up: SPIN_UP,
+            // A target older than COM_OF_LOSS_T ends OFFBOARD, so that its velocity never times out before.
+            target_timeout: seconds("COM_OF_LOSS_T"),
+            return_height_m: parameters.value("RTL_RETURN_ALT"),
+            return_wait: seconds("RTL_LAND_DELAY"),
+            land_slow_below_m: parameters.value("MPC_LAND_ALT2"),
+            land_mps: parameters.value("MPC_LAND_SPEED"),
+            turns_to_course: false,
+        },
+        loss_time: seconds("COM_OF_LOSS_T"),
+        loss_action: parameters.value("COM_OBL_RC_ACT") as u32,
+        battery_levels: ["BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR"].map(|name| parameters.value(name)),
+        battery_action: parameters.value("COM_LOW_BAT_ACT") as u32,
+        disarm_delay: seconds("COM_DISARM_PRFLT"),
+        fence_radius_m: parameters.value("GF_MAX_HOR_DIST"),
+    }
+}
+
+impl Autopilot for Px4 {
+    fn step(&mut self, now: Instant) {
+        self.advance(now);
+    }
+
+    fn receive(&mut self, link: LinkId, mut bytes: &[u8]) {
+        loop {
+            let (rest, frame) = self.ports.receive(link, bytes);
+            let Some(frame) = frame else { return };
+            bytes = rest;
+            self.handle(link, &frame);
+        }
+    }
+
+    fn transmit(&mut self, link: LinkId) -> Vec<Vec<u8>> {
+        self.ports.transmit(link)
+    }
+
+    fn pilot_selects(&mut self, mode: VehicleMode) {
+        self.enter(mode, Commander::Operator);
+    }
+
+    fn inject(&mut self, fault: AircraftFault) {
+        match fault {
+            AircraftFault::Reboot => self.reboot(),
+            AircraftFault::PilotSelects(mode) => self.pilot_selects(mode),
+            AircraftFault::Fence(radius_m) => {
+                self.set_own_parameter("GF_MAX_HOR_DIST", radius_m);
+            }
+            _ => self.airframe.inject(self.now, fault),
+        }
+    }
+
+    fn set_parameter(&mut self, name: &str, value: f32) -> bool {
+        self.set_own_parameter(name, value).is_some()
+    }
+
+    fn truth(&self) -> Truth {
+        let position = self.airframe.true_position();
+        Truth {
+            position,
+            ground_speed_mps: self.airframe.body.ground_speed_mps() as f32,
+            height_m: self.airframe.settings.stand.down_m - position.down_m,
+            armed: self.armed,
+            on_ground: self.airframe.on_ground,
+            mode: self.mode,
+            mode_by: self.mode_by,
+            target_by: self.guidance.target_by(),
+            battery: self.airframe.battery.left(),
+            killed_by_nan: false,
+            is_up: self.now >= self.up_from,
+            ignored_targets: self.ignored_targets,
+        }
+    }
+
+    fn settings(&self) -> &AircraftSettings {
+        &self.airframe.settings
+    }
+}
