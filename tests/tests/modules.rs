@@ -18,7 +18,6 @@ const LONG_FILES_LEFT: [&str; 5] = [
     "firmware/link/src/component/mod.rs",
     "firmware/policy/src/native/blob.rs",
     "host-trainer/src/report/page.rs",
-    "sitl/harness/src/program/arguments.rs",
 ];
 
 const CRATES: [&str; 15] = [

@@ -1,7 +1,7 @@
 //! Arguments of `city` and `radio`.
 
 use super::order::{CityOrder, ImportOrder, RadioFormat, RadioOrder};
-use super::values::{bounds, cell_size, height, point, radio_format, rotation, units};
+use super::values::{Rotation, bounds, cell_size, height, point, radio_format, rotation, units};
 use crate::city::placement::BoundingBox;
 use clap::{Args, Subcommand};
 use gleaner_ports::Endpoint;
@@ -67,13 +67,6 @@ pub(super) struct ImportArguments {
     /// Write a mission file too.
     #[arg(long, value_name = "FILE")]
     mission_out: Option<PathBuf>,
-}
-
-/// The grid's rotation, as given.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Rotation {
-    Auto,
-    Degrees(f64),
 }
 
 impl CityCommand {

@@ -1,11 +1,17 @@
 //! Values on the command line.
 
-use super::city::Rotation;
 use super::order::RadioFormat;
 use crate::city::placement::BoundingBox;
 use crate::{AutopilotKind, Switch};
 use gleaner_units::Duration;
 use gleaner_world::ScenarioKind;
+
+/// The grid's rotation, as given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Rotation {
+    Auto,
+    Degrees(f64),
+}
 
 fn number(text: &str, range: std::ops::RangeInclusive<f32>, error: &str) -> Result<f32, String> {
     text.parse::<f32>().ok().filter(|number| range.contains(number)).ok_or_else(|| error.into())

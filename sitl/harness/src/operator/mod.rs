@@ -7,7 +7,9 @@
 //! PX4 accepts OFFBOARD in the air only when targets already stream: the request to engage starts the stream, then
 //! the operator selects OFFBOARD. Every request is repeated each second until it is answered.
 
-use crate::autopilot::{AutopilotKind, VehicleMode};
+mod stack;
+
+use crate::autopilot::AutopilotKind;
 use crate::wire::{Speaker, parse};
 use gleaner_link::{Address, Frame, FrameDecoder, Message, TUNNEL_DECISION};
 use gleaner_pilot::{DecisionRecord, State};
@@ -66,14 +68,8 @@ enum Step {
 /// `MAV_COMP_ID_MISSIONPLANNER`, the component of most ground stations.
 const COMPONENT: u8 = 190;
 const REPEAT: Duration = Duration::from_secs(1);
-/// Estimator flags: attitude, velocity and position are trusted. `ESTIMATOR_STATUS` has the same bits as
-/// `EKF_STATUS_REPORT`; PX4 does not set the relative ones with GNSS.
-const ARDUPILOT_TRUSTED: u16 = 0x33F;
-const PX4_TRUSTED: u16 = 0x37;
 /// From the request to engage until the operator selects OFFBOARD.
 const STREAM_STARTS: Duration = Duration::from_secs(2);
-/// Base mode of `DO_SET_MODE`: custom mode enabled.
-const CUSTOM_MODE: f32 = 1.0;
 
 /// The operator.
 #[derive(Debug)]
@@ -254,55 +250,36 @@ impl Operator {
                 frames.push(self.set_parameter(name, value));
             }
             Step::Ready => {
-                for &(message_id, interval_us) in self.streams() {
+                for &(message_id, interval_us) in stack::streams(self.orders.autopilot) {
                     let ask = MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL;
                     frames.push(self.command(1, ask, [message_id, interval_us, 0.0, 0.0]));
                 }
             }
-            Step::Guided => frames.push(self.select_guided()),
+            Step::Guided => frames.push(self.command(
+                1,
+                MavCmd::MAV_CMD_DO_SET_MODE,
+                stack::select_guided(self.orders.autopilot),
+            )),
             Step::Arm => {
                 frames.push(self.command(1, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, [1.0, 0.0, 0.0, 0.0]));
             }
             Step::TakeOff => {
-                let altitude_m = self.take_off_altitude_m();
+                let Orders { autopilot, altitude_m, .. } = self.orders;
+                let altitude_m = stack::take_off_altitude_m(autopilot, altitude_m, self.home_amsl_m);
                 frames.push(self.command(1, MavCmd::MAV_CMD_NAV_TAKEOFF, [0.0, 0.0, 0.0, altitude_m]));
             }
             Step::Engage => {
                 let pilot = self.orders.component_id;
                 frames.push(self.command(pilot, MavCmd::MAV_CMD_USER_2, [1.0, 0.0, 0.0, 0.0]));
             }
-            Step::Offboard => frames.push(self.select_guided()),
+            Step::Offboard => frames.push(self.command(
+                1,
+                MavCmd::MAV_CMD_DO_SET_MODE,
+                stack::select_guided(self.orders.autopilot),
+            )),
             Step::Flying => self.switch(now, frames),
             Step::Peers | Step::Climb | Step::Over => {}
         }
-    }
-
-    /// Positions, estimator, battery and power; PX4 sends home and estimator by itself.
-    const fn streams(&self) -> &'static [(f32, f32)] {
-        match self.orders.autopilot {
-            AutopilotKind::ArduPilot => &[(33.0, 2e5), (193.0, 1e6), (147.0, 1e6), (1.0, 1e6)],
-            AutopilotKind::Px4 => &[(33.0, 2e5), (230.0, 1e6), (242.0, 1e6), (147.0, 1e6)],
-        }
-    }
-
-    /// Above home for ArduPilot, above mean sea level for PX4.
-    fn take_off_altitude_m(&self) -> f32 {
-        match self.orders.autopilot {
-            AutopilotKind::ArduPilot => self.orders.altitude_m,
-            AutopilotKind::Px4 => self.home_amsl_m.unwrap_or(0.0) + self.orders.altitude_m,
-        }
-    }
-
-    fn guided(&self) -> u32 {
-        VehicleMode::Guided.custom_mode(self.orders.autopilot).unwrap_or(0)
-    }
-
-    fn select_guided(&mut self) -> Vec<u8> {
-        let [param2, param3] = match self.orders.autopilot {
-            AutopilotKind::ArduPilot => [self.guided() as f32, 0.0],
-            AutopilotKind::Px4 => [(self.guided() >> 16 & 0xFF) as f32, (self.guided() >> 24) as f32],
-        };
-        self.command(1, MavCmd::MAV_CMD_DO_SET_MODE, [CUSTOM_MODE, param2, param3, 0.0])
     }
 
     /// The step that follows, when the present one is done.
@@ -322,14 +299,13 @@ impl Operator {
                 done.then(|| configure(index + 1))
             }
             Step::Ready => {
-                let (trusted, next) = match self.orders.autopilot {
-                    AutopilotKind::ArduPilot => (ARDUPILOT_TRUSTED, Step::Guided),
-                    AutopilotKind::Px4 => (PX4_TRUSTED, Step::Arm),
-                };
-                let home = self.orders.autopilot == AutopilotKind::ArduPilot || self.home_amsl_m.is_some();
+                let autopilot = self.orders.autopilot;
+                let trusted = stack::trusted_estimator(autopilot);
+                let home = autopilot == AutopilotKind::ArduPilot || self.home_amsl_m.is_some();
+                let next = if autopilot == AutopilotKind::ArduPilot { Step::Guided } else { Step::Arm };
                 (home && self.estimator & trusted == trusted).then_some(next)
             }
-            Step::Guided => (self.mode == self.guided()).then_some(Step::Arm),
+            Step::Guided => (self.mode == stack::guided(self.orders.autopilot)).then_some(Step::Arm),
             Step::Arm => self.armed.then_some(Step::TakeOff),
             Step::TakeOff => accepted(MavCmd::MAV_CMD_NAV_TAKEOFF).then_some(Step::Climb),
             Step::Climb => {
