@@ -14,7 +14,7 @@ const CIRCLES_LEFT: [(&str, usize); 3] =
     [("firmware/ports", 1), ("firmware/policy", 2), ("firmware/companion", 1)];
 
 /// Files that are still too long. Remove lines, never add any.
-const LONG_FILES_LEFT: [&str; 5] = [
+const LONG_FILES_LEFT: [&str; 3] = [
     "firmware/link/src/component/mod.rs",
     "firmware/policy/src/native/blob.rs",
     "host-trainer/src/report/page.rs",
