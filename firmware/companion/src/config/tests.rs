@@ -131,3 +131,21 @@ fn the_signing_table_is_read() {
     let error = fault(&format!("{TEXT}\n[signing]\nkey = \"k\"\nports = [\"radio\"]\n"));
     assert!(error.ends_with("line 15: signing.ports: \"radio\": a port is autopilot or ground"), "{error}");
 }
+
+#[test]
+fn operators_and_the_radio_format_are_read() {
+    // Top-level keys stand before the first table.
+    let with = |lines: &str| format!("{lines}\n{TEXT}");
+    let config =
+        merged(&Setup::default(), &with("operators = [\"250/100\"]\nradio_format = \"semtech_udp\""))
+            .unwrap();
+    assert!(config.settings.operators.allow(gleaner_link::Address::new(250, 100)));
+    assert!(!config.settings.operators.allow(gleaner_link::Address::new(255, 190)));
+    assert_eq!(config.radio_format, RadioFormat::SemtechUdp(Calibration::LORA));
+    assert!(
+        fault(&with("operators = [\"gcs\"]")).contains("line 1: operators: \"gcs\": an operator is SYSTEM")
+    );
+    assert!(
+        fault(&with("radio_format = \"nmea\"")).contains("line 1: radio_format = \"nmea\": there are cobs")
+    );
+}
