@@ -22,13 +22,13 @@
 
 mod attention;
 mod blob;
-mod engine;
+mod forward;
 mod kernel;
 mod network;
 mod rowwise;
 
 pub use blob::{Aligned, BlobError, FORMAT, MAGIC, Model, WeightFormat};
-pub use engine::{NativeError, NativePolicy, Workspace};
+pub use forward::{NativeError, NativePolicy, Workspace};
 
 #[cfg(feature = "std")]
 pub use blob::AlignedBytes;

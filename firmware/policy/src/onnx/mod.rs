@@ -12,13 +12,13 @@
 //! damage, not malice: whoever can write the file can seal it again.
 
 mod convert;
-mod engine;
+mod tract;
 mod error;
 mod interface;
 mod metadata;
 
 pub use convert::{ConvertError, convert};
-pub use engine::{InferError, TractPolicy};
+pub use tract::{InferError, TractPolicy};
 pub use error::ModelError;
 pub use interface::{INPUTS, OUTPUTS, Port};
 pub use metadata::{Metadata, ModelCard, ModelInfo, seal, unseal};
