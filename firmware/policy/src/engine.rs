@@ -24,6 +24,15 @@ impl EngineKind {
     /// All engines.
     pub const ALL: [EngineKind; 2] = [EngineKind::Tract, EngineKind::Native];
 
+    /// Whether this program contains the engine.
+    #[must_use]
+    pub const fn is_built(self) -> bool {
+        match self {
+            EngineKind::Tract => cfg!(feature = "tract"),
+            EngineKind::Native => true,
+        }
+    }
+
     /// Name in flags, files and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -178,7 +187,9 @@ impl fmt::Display for Engine {
         match &self.run {
             #[cfg(feature = "tract")]
             Run::Tract(_) => write!(f, "tract"),
-            Run::Portable(policy) => write!(f, "native, portable, weights {}", policy.model().format().name()),
+            Run::Portable(policy) => {
+                write!(f, "native, portable, weights {}", policy.model().format().name())
+            }
             Run::Simd(policy, format) => {
                 write!(f, "native, {}, weights {}", policy.instruction_set(), format.name())
             }

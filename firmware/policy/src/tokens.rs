@@ -1,9 +1,7 @@
 //! From a situation to the arrays that enter the model.
 
 use crate::outlook::{Direct, Outlook};
-use crate::schema::{
-    DEVICE_FEATURES, PREFERENCE_FEATURES, REACHABLE_SNR_DB, SNR_NOT_HEARD_DB, UAV_FEATURES,
-};
+use crate::schema::{DEVICE_FEATURES, PREFERENCE_FEATURES, REACHABLE_SNR_DB, SNR_NOT_HEARD_DB, UAV_FEATURES};
 use crate::{DeviceState, K_MAX, LOCAL_MAP_CELLS, Situation};
 use gleaner_units::Cell;
 use heapless::Vec;

@@ -54,6 +54,7 @@ pub(crate) fn units_per_slot(distance_m2: f32) -> f32 {
 }
 
 /// What ten slots at `cell` collect from a device with unlimited data; `None` out of range or out of sight.
+#[cfg(feature = "std")]
 pub(crate) fn stay_units(sight: &dyn Sight, device: Cell, cell: Cell) -> Option<f32> {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;

@@ -9,7 +9,8 @@ use super::shape::{
     BLOCKS, Block, FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LANES, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS,
 };
 use crate::schema::{
-    self, DEVICE_FEATURES, DEVICE_NORMALISATIONS, Normalisation, PREFERENCE_NORMALISATIONS, UAV_NORMALISATIONS,
+    self, DEVICE_FEATURES, DEVICE_NORMALISATIONS, Normalisation, PREFERENCE_NORMALISATIONS,
+    UAV_NORMALISATIONS,
 };
 use crate::{Attention, FIRST_DEVICE_TOKEN, Inference, LOCAL_MAP_CELLS, Policy, TOKENS, Tokens};
 use core::array;
@@ -158,7 +159,11 @@ impl Workspace {
         }
         let [first, ..] = &mut self.tokens;
         put(first, 0, project(&network.project_uav, &normalise(&tokens.uav, &UAV_NORMALISATIONS)));
-        put(first, 1, project(&network.project_preference, &normalise(&tokens.preference, &PREFERENCE_NORMALISATIONS)));
+        put(
+            first,
+            1,
+            project(&network.project_preference, &normalise(&tokens.preference, &PREFERENCE_NORMALISATIONS)),
+        );
         put(first, 2, project(&network.project_map, &map.map(|units| schema::YIELD.apply(units))));
     }
 

@@ -34,9 +34,9 @@ mod shape;
 #[cfg(feature = "std")]
 mod simd;
 
+pub use aligned::Aligned;
 #[cfg(feature = "std")]
 pub use aligned::AlignedBytes;
-pub use aligned::Aligned;
 pub use format::{FORMAT, MAGIC, WeightFormat};
 #[cfg(feature = "std")]
 pub(crate) use format::{Header, SOURCE_BYTES, crc32};

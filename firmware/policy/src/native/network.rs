@@ -1,7 +1,9 @@
 //! The network's weights, in the order of a blob.
 
 use super::reader::{BlobError, Reader};
-use super::shape::{FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LAYERS, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS};
+use super::shape::{
+    FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LAYERS, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS,
+};
 use crate::LOCAL_MAP_CELLS;
 use crate::schema::{DEVICE_FEATURES, PREFERENCE_FEATURES, UAV_FEATURES};
 use zerocopy::{FromBytes, Immutable, KnownLayout};

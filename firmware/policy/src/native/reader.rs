@@ -57,11 +57,11 @@ pub enum BlobError {
 impl fmt::Display for BlobError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            BlobError::Misaligned => {
-                write!(f, "the model is not aligned to 4 bytes: align it")?
-            }
+            BlobError::Misaligned => write!(f, "the model is not aligned to 4 bytes: align it")?,
             BlobError::Magic => write!(f, "not a model file of the native engine")?,
-            BlobError::Format { found } => write!(f, "the model has layout {found}, this program reads {FORMAT}")?,
+            BlobError::Format { found } => {
+                write!(f, "the model has layout {found}, this program reads {FORMAT}")?
+            }
             BlobError::Length { expected, found } => {
                 write!(f, "the model has {found} bytes instead of {expected}")?;
             }

@@ -1,9 +1,9 @@
 //! Conversion of the ONNX file to the blob of the native engine.
 
-use super::pb::tensor_proto::DataType;
-use super::pb::{GraphProto, TensorProto};
 use super::error::{ConvertError, ModelError};
 use super::metadata::{ModelInfo, unseal};
+use super::pb::tensor_proto::DataType;
+use super::pb::{GraphProto, TensorProto};
 use crate::native::{
     AlignedBytes, FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, HEAD_WIDTH, Header, LAYERS, LOGIT_PANELS, Model,
     NativePolicy, PANEL, SOURCE_BYTES, WIDTH, WeightFormat, Workspace, crc32,

@@ -1,8 +1,7 @@
 //! Why a model file is refused or cannot be converted.
 
-
-use crate::{LOCAL_MAP_CELLS, SelfTestError};
 use crate::native::BlobError;
+use crate::{LOCAL_MAP_CELLS, SelfTestError};
 
 /// Why a model file is refused.
 #[derive(Debug, thiserror::Error)]

@@ -1,8 +1,8 @@
 //! The metadata of a model file: writing, reading and the seal.
 
-use super::pb::{ModelProto, StringStringEntryProto};
 use super::error::ModelError;
 use super::interface;
+use super::pb::{ModelProto, StringStringEntryProto};
 use crate::schema::{self, FEATURES};
 use crate::{Golden, K_MAX};
 use gleaner_units::Action;

@@ -1,5 +1,8 @@
 //! Linear layers and layer norms on vector registers.
-#![expect(clippy::indexing_slicing, reason = "constant indices below constant lengths, in loops that must unroll")]
+#![expect(
+    clippy::indexing_slicing,
+    reason = "constant indices below constant lengths, in loops that must unroll"
+)]
 
 use super::pack::{Norm, Packed, VECTORS};
 use crate::native::shape::{LAYER_NORM_EPSILON, WIDTH};

@@ -198,7 +198,8 @@ impl WithSimd for Forward<'_> {
         self.join();
         let (observations, width) = (self.batch.len(), self.weights.logits.outputs());
         let Work { joined, head, logits, .. } = &mut *self.work;
-        let (joined, head) = (joined.first(observations * HEAD_INPUTS), head.first_mut(observations * HEAD_HIDDEN));
+        let (joined, head) =
+            (joined.first(observations * HEAD_INPUTS), head.first_mut(observations * HEAD_HIDDEN));
         simd.vectorize(Multiply::<RECTIFY> { layer: &self.weights.head, x: joined, y: head });
         let padded = logits.first_mut(observations * width);
         simd.vectorize(Multiply::<STORE> { layer: &self.weights.logits, x: head, y: padded });
