@@ -3,7 +3,9 @@
 use crate::autopilot::{CopterSettings, Pack};
 use crate::modem::device_id;
 use gleaner_pilot::{DeviceSite, MAX_DEVICES, Mission, MissionError};
-use gleaner_units::{BatteryUnits, CellSet, GeoPoint, GridFrame, Metres, MetresPerSecond, Ned};
+use gleaner_units::{
+    BatteryUnits, CellSet, Degrees, GeoPoint, GridFrame, GridPose, Metres, MetresPerSecond, Ned,
+};
 use gleaner_world::{Realization, Scenario, ScenarioError, ScenarioKind, Seed, World};
 use std::sync::Arc;
 use thiserror::Error;
@@ -38,6 +40,8 @@ pub struct MissionPlan {
     /// How many seconds the aircraft lives while its pilot's clock counts one. A pilot in this process shares the
     /// aircraft's clock: 1. An emulated board keeps the wall's, and nobody waits ten minutes for a flight.
     pub haste: f32,
+    /// Rotation of the city's grid, clockwise from true north.
+    pub rotation: Degrees,
 }
 
 impl MissionPlan {
@@ -45,7 +49,16 @@ impl MissionPlan {
     #[must_use]
     pub const fn new(kind: ScenarioKind, seed: u64) -> MissionPlan {
         let reserve = BatteryUnits(0.0);
-        MissionPlan { kind, seed, devices: None, battery: None, reserve, wander_m: 0.0, haste: 1.0 }
+        MissionPlan {
+            kind,
+            seed,
+            devices: None,
+            battery: None,
+            reserve,
+            wander_m: 0.0,
+            haste: 1.0,
+            rotation: Degrees(0.0),
+        }
     }
 }
 
@@ -106,24 +119,23 @@ impl Staged {
             return Err(PlanError::BatteryTooLarge(scenario.battery.0));
         }
         let realization = Realization::draw(world.city(), &scenario, Seed::evaluation(plan.seed))?;
-        let mission = Staged::mission(&world, &realization)?;
+        let pose = GridPose { corner: CORNER, rotation: plan.rotation };
+        let mission = Staged::mission(&world, &realization, pose)?;
         let grid = mission.grid();
         // The origin lies so that the stand is the centre of the start cell.
-        let cell_m = grid.cell().0;
-        let start = realization.start();
-        let north_m = (f32::from(start.y) + 0.5) * cell_m - STAND.north_m;
-        let east_m = (f32::from(start.x) + 0.5) * cell_m - STAND.east_m;
+        let start = GridFrame::new(grid, pose, CORNER).centre(realization.start(), STAND.down_m);
+        let [north_m, east_m] = [start.north_m - STAND.north_m, start.east_m - STAND.east_m];
         let origin = CORNER.offset_by(Metres(north_m), Metres(east_m));
         let mut pack = Pack::new(capacity);
         // A slot of hovering is a time on the pilot's clock: it must not cost the aircraft more for its haste.
         pack.hover_per_s /= plan.haste;
         let (wander_m, seed) = (plan.wander_m, plan.seed);
         let copter = CopterSettings { system_id: 1, origin, stand: STAND, pack, wander_m, seed };
-        let frame = GridFrame::new(grid, CORNER, origin);
+        let frame = GridFrame::new(grid, pose, origin);
         Ok(Staged { plan, world, realization, mission, copter, frame })
     }
 
-    fn mission(world: &World, realization: &Realization) -> Result<Mission, MissionError> {
+    fn mission(world: &World, realization: &Realization, pose: GridPose) -> Result<Mission, MissionError> {
         let sites = realization.devices().iter().enumerate().map(|(index, placement)| DeviceSite {
             id: device_id(index),
             cell: placement.cell,
@@ -132,7 +144,7 @@ impl Staged {
         let mission = Mission {
             heights: world.city().heights().clone(),
             fence: CellSet::full(world.city().grid()),
-            corner: CORNER,
+            pose,
             terminal: realization.terminal(),
             budget: realization.battery(),
             devices: sites.collect(),

@@ -2,7 +2,7 @@
 //!
 //! ```toml
 //! model = "policy.onnx"                       # optional; paths are relative to this file
-//! engine = "tract"                            # optional: tract or native
+//! engine = "native"                           # optional: native or tract
 //! mission = "mission.toml"
 //! autopilot = "serial:/dev/ttyAMA0:921600"
 //! ground = ["udpout:192.168.1.10:14550"]      # optional: more MAVLink ports

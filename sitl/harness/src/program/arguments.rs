@@ -5,7 +5,7 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
-use gleaner_units::{BatteryUnits, Duration};
+use gleaner_units::{BatteryUnits, Degrees, Duration};
 use gleaner_world::ScenarioKind;
 use std::path::PathBuf;
 
@@ -45,7 +45,7 @@ struct SweepArguments {
     /// The model [default: the built-in one].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
-    /// What runs the model: tract or native.
+    /// Engine that runs the model: native, or tract in a build with that feature.
     #[arg(long, value_name = "ENGINE", default_value = "native")]
     engine: EngineKind,
     /// Print one JSON object instead of a table.
@@ -76,11 +76,14 @@ struct MissionArguments {
     /// Battery units kept back on top of the way home; 0 is the paper's safety controller.
     #[arg(long, value_name = "UNITS", default_value = "0", value_parser = units)]
     reserve: f32,
+    /// Rotation of the city's grid: direction of its north axis, degrees clockwise from true north, -180 to 180.
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_negative_numbers = true, value_parser = rotation)]
+    grid_rotation: f32,
     /// The model [default: the built-in one].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
-    /// What runs the model: tract or native.
-    #[arg(long, value_name = "ENGINE", default_value = "tract")]
+    /// Engine that runs the model: native, or tract in a build with that feature.
+    #[arg(long, value_name = "ENGINE", default_value = "native")]
     engine: EngineKind,
 }
 
@@ -267,6 +270,7 @@ impl MissionArguments {
             devices: self.devices.map(usize::from),
             battery: self.battery.map(BatteryUnits),
             reserve: BatteryUnits(self.reserve),
+            rotation: Degrees(self.grid_rotation),
             ..MissionPlan::new(self.scenario, self.seed)
         }
     }
@@ -339,6 +343,11 @@ fn weight(text: &str) -> Result<f32, String> {
 fn units(text: &str) -> Result<f32, String> {
     let number = text.parse::<f32>().ok().filter(|units| (0.0..=500.0).contains(units));
     number.ok_or_else(|| "battery units are a number from 0 to 500".into())
+}
+
+fn rotation(text: &str) -> Result<f32, String> {
+    let number = text.parse::<f32>().ok().filter(|degrees| (-180.0..=180.0).contains(degrees));
+    number.ok_or_else(|| "a rotation is a number of degrees from -180 to 180".into())
 }
 
 fn speed(text: &str) -> Result<f32, String> {
