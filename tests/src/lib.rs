@@ -3,6 +3,7 @@
 //! # Glossary
 //! - **judge**: a program by other authors that decides whether Gleaner's output is right.
 
+pub mod benchmarks;
 pub mod board;
 pub mod observations;
 pub mod programs;

@@ -46,7 +46,7 @@ fn the_json_report_has_the_documented_keys() {
     ];
     assert_eq!(keys, contract);
     assert_eq!(report["switches"], 1);
-    assert_eq!(report["engine"], "tract");
+    assert_eq!(report["engine"], "native");
 }
 
 #[test]

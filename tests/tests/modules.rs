@@ -10,33 +10,24 @@ use std::path::Path;
 const MOST_LINES: usize = 400;
 
 /// Crates that still have circles, and at most how many. Lower the numbers, never raise them.
-const CIRCLES_LEFT: [(&str, usize); 3] =
-    [("firmware/ports", 1), ("firmware/policy", 2), ("firmware/companion", 1)];
+const CIRCLES_LEFT: [(&str, usize); 2] = [("firmware/policy", 2), ("firmware/companion", 1)];
 
 /// Files that are still too long. Remove lines, never add any.
-const LONG_FILES_LEFT: [&str; 3] = [
-    "firmware/link/src/component/mod.rs",
-    "firmware/policy/src/native/blob.rs",
-    "host-trainer/src/report/page.rs",
-];
+const LONG_FILES_LEFT: [&str; 0] = [];
 
-const CRATES: [&str; 15] = [
-    "firmware/units",
-    "firmware/ports",
-    "firmware/guard",
-    "firmware/policy",
-    "firmware/link",
-    "firmware/radio",
-    "firmware/lookahead",
-    "firmware/pilot",
-    "firmware/companion",
-    "firmware/dashboard",
-    "firmware/cortex-m",
-    "sitl/world",
-    "sitl/harness",
-    "host-trainer",
-    "tests",
-];
+/// Folders of the workspace's crates.
+fn crates() -> Vec<String> {
+    let mut found = vec!["host-trainer".to_owned(), "tests".to_owned()];
+    for group in ["firmware", "sitl"] {
+        for entry in fs::read_dir(repository().join(group)).unwrap().flatten() {
+            if entry.path().join("Cargo.toml").exists() {
+                found.push(format!("{group}/{}", entry.file_name().to_str().unwrap()));
+            }
+        }
+    }
+    assert!(found.len() >= 13, "only {found:?}");
+    found
+}
 
 fn names(circle: &BTreeSet<Module>) -> Vec<String> {
     circle.iter().map(|module| module.join("::")).collect()
@@ -46,8 +37,8 @@ fn names(circle: &BTreeSet<Module>) -> Vec<String> {
 fn no_crate_has_circular_modules() {
     let mut edges_found = 0;
     let mut faults = Vec::new();
-    for folder in CRATES {
-        let edges = Crate::read(&repository().join(folder).join("src")).edges();
+    for folder in crates() {
+        let edges = Crate::read(&repository().join(&folder).join("src")).edges();
         edges_found += edges.len();
         let circles = circles(&edges);
         let most = CIRCLES_LEFT.iter().find(|(of, _)| *of == folder).map_or(0, |(_, most)| *most);

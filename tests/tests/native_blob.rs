@@ -168,7 +168,8 @@ fn each_engine_names_the_file_it_needs() {
     assert_eq!((engine.sha256(), own.sha256()), (tract.sha256(), tract.sha256()));
     assert_eq!((engine.name(), own.name()), (tract.name(), tract.name()));
     assert_eq!(own.goldens(), tract.goldens(), "to the last bit");
-    assert_eq!(engine.to_string(), "native, weights f32");
+    let name = engine.to_string();
+    assert!(name.starts_with("native, ") && name.ends_with(", weights f32"), "{name}");
     let refused = Engine::load_checked(&blob(WeightFormat::F32), EngineKind::Tract).err().expect("refused");
     assert!(refused.to_string().ends_with("choose the engine native, or give the ONNX file"), "{refused}");
     let refused = Engine::load_checked(b"\x89GLN\r\n\x1a\n", EngineKind::Native).err().expect("refused");

@@ -1,7 +1,7 @@
-//! The native engine against tract: one model, two engines, the same decisions.
+//! The native engine's two implementations against each other and against tract: one model, the same decisions.
 
 use gleaner_host_trainer::export::read_actor;
-use gleaner_policy::native::{AlignedBytes, Model, NativePolicy, WeightFormat, Workspace};
+use gleaner_policy::native::{AlignedBytes, Model, NativePolicy, SimdPolicy, WeightFormat, Workspace};
 use gleaner_policy::onnx::{TractPolicy, convert};
 use gleaner_policy::{FIRST_DEVICE_TOKEN, GOLDEN_TOLERANCE, Inference, K_MAX, Policy, Tokens};
 use gleaner_tests::observations::{flown, random};
@@ -23,7 +23,7 @@ fn blob(format: WeightFormat) -> AlignedBytes {
     AlignedBytes::new(&convert(&shipped("gleaner.onnx"), format).expect("a model that can be converted"))
 }
 
-/// Calls `ask` with the engine and the shipped model.
+/// Runs `ask` with the portable engine and the shipped model.
 fn with_native<T>(format: WeightFormat, ask: impl FnOnce(&mut NativePolicy<'_>) -> T) -> T {
     let blob = blob(format);
     let mut workspace = Workspace::new();
@@ -31,10 +31,13 @@ fn with_native<T>(format: WeightFormat, ask: impl FnOnce(&mut NativePolicy<'_>) 
     ask(&mut NativePolicy::new(model, &mut workspace))
 }
 
-/// The difference between two engines.
+/// Largest differences between two engines.
 #[derive(Clone, Copy, Debug, Default)]
 struct Apart {
+    /// Largest difference of a logit.
     logits: f32,
+    /// The same, divided by the observation's largest logit if that exceeds 1.
+    relative: f32,
     attention: f32,
     decisions: usize,
 }
@@ -46,7 +49,10 @@ impl Apart {
                 if apart.is_nan() { f32::INFINITY } else { f32::max(largest, apart) }
             })
         };
-        self.logits = self.logits.max(largest(&a.logits, &b.logits));
+        let logits = largest(&a.logits, &b.logits);
+        self.logits = self.logits.max(logits);
+        let scale = a.logits.iter().fold(1.0, |scale, logit| f32::max(scale, logit.abs()));
+        self.relative = self.relative.max(logits / scale);
         let attention = largest(a.attention.0.as_flattened(), b.attention.0.as_flattened());
         self.attention = self.attention.max(attention);
         self.decisions += usize::from(mask.argmax(&a.logits) != mask.argmax(&b.logits));
@@ -55,27 +61,57 @@ impl Apart {
     fn join(self, other: Apart) -> Apart {
         Apart {
             logits: self.logits.max(other.logits),
+            relative: self.relative.max(other.relative),
             attention: self.attention.max(other.attention),
             decisions: self.decisions + other.decisions,
         }
     }
 }
 
-/// Compares both engines, on all processors.
-fn compare(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apart {
+/// Splits the observations over all processors.
+fn on_all_processors(
+    observations: &[(Tokens, ActionMask)],
+    compare: impl Fn(&[(Tokens, ActionMask)]) -> Apart + Copy + Send + Sync,
+) -> Apart {
     let threads = thread::available_parallelism().map_or(1, usize::from);
     thread::scope(|scope| {
-        let parts = questions.chunks(questions.len().div_ceil(threads));
-        let parts: Vec<_> = parts.map(|part| scope.spawn(move || compare_here(format, part))).collect();
+        let parts = observations.chunks(observations.len().div_ceil(threads));
+        let parts: Vec<_> = parts.map(|part| scope.spawn(move || compare(part))).collect();
         parts.into_iter().map(|part| part.join().expect("no panic")).fold(Apart::default(), Apart::join)
     })
 }
 
-fn compare_here(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apart {
+/// The portable engine against tract.
+fn compare(format: WeightFormat, observations: &[(Tokens, ActionMask)]) -> Apart {
+    on_all_processors(observations, |part| compare_here(format, part))
+}
+
+/// The vectorised engine against the portable one; and one observation against a batch, which must be equal.
+fn compare_vectorised(observations: &[(Tokens, ActionMask)]) -> Apart {
+    with_native(WeightFormat::F32, |portable| {
+        let mut simd = SimdPolicy::new(portable.model()).expect("tests run where there is a vector unit");
+        let mut apart = Apart::default();
+        for batch in observations.chunks(7) {
+            let tokens: Vec<Tokens> = batch.iter().map(|(tokens, _)| tokens.clone()).collect();
+            let together = simd.logits_of(&tokens).expect("logits");
+            for ((tokens, mask), together) in batch.iter().zip(together) {
+                let (a, b) = (portable.infer(tokens).expect("logits"), simd.infer(tokens).expect("logits"));
+                assert_eq!(simd.logits(tokens), Ok(b.logits), "with and without attention");
+                for (one, of_batch) in b.logits.iter().zip(together) {
+                    assert!((one - of_batch).abs() <= 1e-5, "alone {one}, in a batch {of_batch}");
+                }
+                apart.add(&a, &b, *mask);
+            }
+        }
+        apart
+    })
+}
+
+fn compare_here(format: WeightFormat, observations: &[(Tokens, ActionMask)]) -> Apart {
     let mut tract = TractPolicy::load_checked(&shipped("gleaner.onnx")).expect("the model proves itself");
     with_native(format, |native| {
         let mut apart = Apart::default();
-        for (tokens, mask) in questions {
+        for (tokens, mask) in observations {
             let (a, b) = (tract.infer(tokens).expect("an answer"), native.infer(tokens).expect("an answer"));
             apart.add(&a, &b, *mask);
         }
@@ -83,9 +119,9 @@ fn compare_here(format: WeightFormat, questions: &[(Tokens, ActionMask)]) -> Apa
     })
 }
 
-/// The flashed model is a conversion of the trained one.
+/// The flashed model is derived from the ONNX file.
 #[test]
-fn the_committed_blob_is_the_conversion_of_the_committed_model() {
+fn committed_blob_is_the_committed_model_converted() {
     assert!(
         blob(WeightFormat::F32).as_slice() == shipped("gleaner.gln"),
         "models/gleaner.gln is not made from models/gleaner.onnx: type cargo run --release -p gleaner-companion -- \
@@ -93,31 +129,55 @@ fn the_committed_blob_is_the_conversion_of_the_committed_model() {
     );
 }
 
-#[test]
-fn engines_agree_on_random_observations() {
+fn random_observations() -> Vec<(Tokens, ActionMask)> {
     let mut rng = ChaCha8Rng::seed_from_u64(404);
     let observations = random(&mut rng, RANDOM);
     let mut mask = || ActionMask::from_bits(rng.random_range(1..32));
-    let questions: Vec<_> = observations.into_iter().map(|tokens| (tokens, mask())).collect();
-    let apart = compare(WeightFormat::F32, &questions);
-    println!("{RANDOM} random observations: {apart:?}");
+    observations.into_iter().map(|tokens| (tokens, mask())).collect()
+}
+
+fn flown_observations() -> Vec<(Tokens, ActionMask)> {
+    flown(&read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights"), FLOWN)
+}
+
+fn assert_portable_agrees_with_tract(observations: &[(Tokens, ActionMask)]) {
+    let apart = compare(WeightFormat::F32, observations);
+    println!("portable and tract, {} observations: {apart:?}", observations.len());
     assert!(apart.logits <= GOLDEN_TOLERANCE && apart.attention <= GOLDEN_TOLERANCE, "{apart:?}");
-    assert_eq!(apart.decisions, 0, "other decisions: {apart:?}");
+    assert_eq!(apart.decisions, 0, "{apart:?}");
+}
+
+/// The rule of the crate's page: the portable engine is exact, the vectorised one within 1e-5 of the logits' scale.
+fn assert_vectorised_agrees_with_portable(observations: &[(Tokens, ActionMask)]) {
+    let apart = on_all_processors(observations, compare_vectorised);
+    println!("vectorised and portable, {} observations: {apart:?}", observations.len());
+    assert!(apart.relative <= 1e-5 && apart.attention <= 1e-5, "{apart:?}");
+    assert_eq!(apart.decisions, 0, "{apart:?}");
 }
 
 #[test]
-fn engines_agree_on_flown_observations() {
-    let actor = read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights");
-    let questions = flown(&actor, FLOWN);
-    let apart = compare(WeightFormat::F32, &questions);
-    println!("{FLOWN} flown observations: {apart:?}");
-    assert!(apart.logits <= GOLDEN_TOLERANCE && apart.attention <= GOLDEN_TOLERANCE, "{apart:?}");
-    assert_eq!(apart.decisions, 0, "other decisions: {apart:?}");
+fn portable_and_tract_agree_on_random_observations() {
+    assert_portable_agrees_with_tract(&random_observations());
+}
+
+#[test]
+fn portable_and_tract_agree_on_flown_observations() {
+    assert_portable_agrees_with_tract(&flown_observations());
+}
+
+#[test]
+fn vectorised_and_portable_agree_on_random_observations() {
+    assert_vectorised_agrees_with_portable(&random_observations());
+}
+
+#[test]
+fn vectorised_and_portable_agree_on_flown_observations() {
+    assert_vectorised_agrees_with_portable(&flown_observations());
 }
 
 /// Half the flash for less than one decision in a thousand.
 #[test]
-fn weights_of_16_bits_change_few_decisions() {
+fn with_16_bits_nearly_all_decisions_are_the_same() {
     let actor = read_actor(&shipped("gleaner.onnx")).expect("the trainer's weights");
     let apart = compare(WeightFormat::I16, &flown(&actor, FLOWN));
     println!("{FLOWN} flown observations, 16 bits: {apart:?}");
@@ -125,7 +185,7 @@ fn weights_of_16_bits_change_few_decisions() {
 }
 
 #[test]
-fn the_order_of_the_devices_does_not_matter() {
+fn device_order_does_not_matter() {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let observations = random(&mut rng, 20 * (K_MAX + 1));
     with_native(WeightFormat::F32, |native| {
@@ -146,8 +206,8 @@ fn the_order_of_the_devices_does_not_matter() {
             }
             let mut apart = Apart::default();
             apart.add(&a, &b, ActionMask::FULL);
-            // Another summation order through all layers. Random maps have large values everywhere, so intermediate
-            // values exceed the logits.
+            // Sums of another order, through all layers. Drawn maps are bright everywhere, so the numbers inside are
+            // larger than the logits.
             let largest = a.logits.iter().fold(1.0_f32, |largest, logit| largest.max(logit.abs()));
             assert!(
                 apart.logits < 4e-6 * largest && apart.attention < 2e-5,
@@ -157,9 +217,9 @@ fn the_order_of_the_devices_does_not_matter() {
     });
 }
 
-/// Lanes of absent devices hold values of an earlier observation, which must not matter.
+/// Lanes of absent devices hold numbers of earlier observations.
 #[test]
-fn earlier_observations_leave_no_trace() {
+fn absent_devices_and_earlier_observations_leave_no_trace() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let observations = random(&mut rng, 4 * (K_MAX + 1));
     let mut full = observations[K_MAX].clone();
@@ -172,7 +232,7 @@ fn earlier_observations_leave_no_trace() {
             let fresh = with_native(format, |native| native.infer(tokens).unwrap());
             let used = with_native(format, |native| {
                 native.infer(&full).unwrap();
-                assert!(native.infer(&endless).is_err(), "an infinite battery is refused");
+                assert!(native.infer(&endless).is_err(), "an endless battery has no answer");
                 native.infer(tokens).unwrap()
             });
             assert_eq!(fresh, used, "to the last bit, {} devices", tokens.devices.len());

@@ -49,7 +49,7 @@ fn conversion_errors_are_one_line() {
         ),
         (
             vec!["bench", "--model", "models/gleaner.gln"],
-            "gleaner: model models/gleaner.gln: this is the native engine's own file",
+            "gleaner: model models/gleaner.gln: a model file of the native engine",
         ),
     ] {
         let output = gleaner("gleaner", &arguments);
@@ -66,7 +66,7 @@ fn bench_shows_both_engines_side_by_side() {
         stdout(&gleaner("gleaner", &["bench", "--model", "models/gleaner.onnx", "--inferences", "20"]));
     let rows: Vec<Vec<f64>> = said
         .lines()
-        .skip(2)
+        .skip(3)
         .map(|line| line.split_whitespace().map(|number| number.parse().unwrap()).collect())
         .collect();
     assert!(!rows.is_empty(), "{said}");
@@ -82,8 +82,8 @@ fn bench_shows_both_engines_side_by_side() {
 fn check_names_the_engine() {
     let folder = tempfile::tempdir().unwrap();
     for (model, engine, line) in [
-        ("models/gleaner.gln", "native", "ok    engine     native, weights f32"),
-        ("models/gleaner.onnx", "native", "ok    engine     native, weights f32"),
+        ("models/gleaner.gln", "native", "ok    engine     native, "),
+        ("models/gleaner.onnx", "native", "ok    engine     native, "),
         ("models/gleaner.onnx", "tract", "ok    engine     tract"),
     ] {
         let dist = "firmware/companion/dist/gleaner.toml";
@@ -92,7 +92,7 @@ fn check_names_the_engine() {
         arguments.extend(["--autopilot", "udpin:127.0.0.1:0", "--radio", "udp:127.0.0.1:0"]);
         arguments.extend(["--log", folder.path().to_str().unwrap()]);
         let said = stdout(&gleaner("gleaner", &arguments));
-        assert!(said.lines().any(|said| said == line), "{said}");
+        assert!(said.lines().any(|said| said.starts_with(line)), "{said}");
     }
 }
 

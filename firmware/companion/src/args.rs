@@ -87,8 +87,8 @@ pub struct Replay {
     /// The trained policy [default: the built-in one].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// The engine: tract or native.
-    #[arg(long, value_name = "ENGINE", default_value = "tract")]
+    /// Engine that runs the model: native, or tract in a build with that feature.
+    #[arg(long, value_name = "ENGINE", default_value = "native")]
     pub engine: EngineKind,
 }
 
@@ -135,7 +135,7 @@ pub struct Setup {
     /// The trained policy [default: the built-in one].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// The engine: tract or native.
+    /// Engine that runs the model: native, or tract in a build with that feature.
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<EngineKind>,
     /// The mission.

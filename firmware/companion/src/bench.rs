@@ -1,4 +1,4 @@
-//! `gleaner bench`: the time of one inference in each engine.
+//! `gleaner bench`: the time of one inference in each engine, side by side.
 
 use crate::args::Bench;
 use crate::error::StartError;
@@ -8,47 +8,58 @@ use std::hint::black_box;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-/// Prints minimum and median of both engines, and their ratio, for each number of devices in the golden pairs.
+/// Prints minimum and median of each engine, and the ratio of medians of two, for each number of devices in the golden
+/// pairs.
 ///
 /// # Errors
-/// The model cannot be loaded in both engines.
+/// An engine of this program refuses the model.
 pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
-    let [tract, native] =
-        [EngineKind::Tract, EngineKind::Native].map(|kind| load::model(order.model.as_deref(), kind));
-    let [mut tract, mut native] = [tract?, native?];
-    let mut pairs: Vec<&Golden> = Vec::new();
-    let goldens = native.goldens().to_vec();
-    for golden in &goldens {
-        if pairs.iter().all(|pair| pair.tokens.devices.len() != golden.tokens.devices.len()) {
-            pairs.push(golden);
+    let kinds = EngineKind::ALL.into_iter().filter(|kind| kind.is_built());
+    let mut engines =
+        kinds.map(|kind| load::model(order.model.as_deref(), kind)).collect::<Result<Vec<_>, _>>()?;
+    let mut goldens: Vec<Golden> = Vec::new();
+    for golden in engines.iter().flat_map(Engine::goldens) {
+        if goldens.iter().all(|other| other.tokens.devices.len() != golden.tokens.devices.len()) {
+            goldens.push(golden.clone());
         }
     }
-    println!("{} {}, {} inferences each, alternating; us", native.name(), native.version(), order.inferences);
-    println!("devices    tract minimum  median    native minimum  median    ratio of medians");
-    for golden in pairs {
-        let [mut slow, mut fast] = [Times::default(), Times::default()];
-        for _ in 0..order.inferences {
-            slow.add(&mut tract, golden);
-            fast.add(&mut native, golden);
-        }
-        let ([slow_least, slow_median], [fast_least, fast_median]) = (slow.micros(), fast.micros());
-        let ratio = slow_median / fast_median;
+    for engine in &engines {
         println!(
-            "{:7}    {slow_least:13.1}  {slow_median:6.1}    {fast_least:14.1}  {fast_median:6.1}    {ratio:.2}",
-            golden.tokens.devices.len()
+            "{} {} in {engine}, {} inferences in turns; us",
+            engine.name(),
+            engine.version(),
+            order.inferences
         );
+    }
+    print!("devices");
+    engines.iter().for_each(|engine| print!("{:>10} minimum    median", engine.kind().name()));
+    println!("{}", if engines.len() > 1 { "    ratio of medians" } else { "" });
+    for golden in &goldens {
+        let mut times: Vec<Times> = engines.iter().map(|_| Times::default()).collect();
+        for _ in 0..order.inferences {
+            for (engine, times) in engines.iter_mut().zip(&mut times) {
+                times.add(engine, golden);
+            }
+        }
+        print!("{:7}", golden.tokens.devices.len());
+        let times: Vec<[f64; 2]> = times.iter_mut().map(Times::micros).collect();
+        times.iter().for_each(|[least, median]| print!("{least:18.1}  {median:8.1}"));
+        match times[..] {
+            [[_, first], [_, second]] => println!("    {:.2}", first / second),
+            _ => println!(),
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// The duration of each inference.
+/// The time of each inference.
 #[derive(Default)]
 struct Times(Vec<Duration>);
 
 impl Times {
     fn add(&mut self, engine: &mut Engine, golden: &Golden) {
         let start = Instant::now();
-        // Its answers were verified when it was loaded.
+        // Cannot fail: the self-test ran the same inference.
         let _ = black_box(engine.infer(black_box(&golden.tokens)));
         self.0.push(start.elapsed());
     }

@@ -132,7 +132,10 @@ fn configurations() {
         (
             "udpin:127.0.0.1:0",
             "udpin:0",
-            &["line 3: autopilot: 'udpin:0' is not an endpoint: ", "write HOST:PORT, as in"],
+            &[
+                "line 3: autopilot: 'udpin:0' is not an endpoint: ",
+                "write HOST:PORT: did you mean udpin:0.0.0.0:14550?",
+            ],
         ),
         (
             "GLN_W_DATA = 0.25",

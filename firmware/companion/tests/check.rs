@@ -61,7 +61,7 @@ fn every_fault_is_printed() {
         ("FAIL  altitude   30 m is not above the tallest building of 33 m", "raise GLN_ALT"),
         ("FAIL  model", "export the model again, or report this machine"),
         ("FAIL  autopilot", "or choose another number"),
-        ("FAIL  log", "or its permissions"),
+        ("FAIL  log", "or correct its permissions"),
         ("not ready", "6 faults, 3 warnings"),
     ] {
         assert!(lines.iter().any(|line| line.starts_with(start) && line.ends_with(end)), "{start}: {stdout}");

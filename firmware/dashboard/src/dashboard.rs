@@ -161,7 +161,7 @@ fn live<P: Policy>(t_s: f64, now: Instant, onboard: &Onboard<P>, telemetry: Tele
     let stats = onboard.stats();
     let state = onboard.state();
     let place = vehicle.position.zip(vehicle.origin).map(|(position, origin)| {
-        let point = GridFrame::new(mission.grid(), mission.corner, origin).point(&position);
+        let point = GridFrame::new(mission.grid(), mission.pose, origin).point(&position);
         (point.east_m / mission.grid().cell().0, point.north_m / mission.grid().cell().0)
     });
     let height_m = vehicle.position.zip(vehicle.home_down_m).map(|(at, home_down_m)| home_down_m - at.down_m);

@@ -4,7 +4,7 @@ use gleaner_units::{Action, Cell, CellSet, Grid, MAX_CELLS};
 
 const UNREACHED: u16 = u16::MAX;
 
-/// Moves to the terminal for every cell of a grid.
+/// Moves to the terminal from every cell of a grid.
 #[derive(Clone, Debug)]
 pub(crate) struct DistanceField {
     grid: Grid,
@@ -12,20 +12,20 @@ pub(crate) struct DistanceField {
 }
 
 impl DistanceField {
-    /// No cell of `grid` reaches anything.
+    /// A field in which no cell reaches the terminal.
     pub(crate) const fn unreached(grid: Grid) -> DistanceField {
         DistanceField { grid, moves: [UNREACHED; MAX_CELLS] }
     }
 
-    /// Breadth-first search from `terminal` over the cells of `fence`, in place. The frontiers are sets, a quarter of a
-    /// kilobyte each: a queue would take as much stack as the field itself.
+    /// Breadth-first search from `terminal` over the cells of `fence`, in place. The frontiers are cell sets of 256 bytes; a
+    /// queue would take as much stack as the field.
     pub(crate) fn search(&mut self, fence: &CellSet, terminal: Cell) {
         self.grid = fence.grid();
         self.moves.fill(UNREACHED);
         let mut frontier = CellSet::empty(self.grid);
         frontier.insert(terminal);
         self.set(terminal, 0);
-        // The longest way is shorter than the number of cells.
+        // No shortest path has as many moves as the grid has cells.
         for moves in 1..=MAX_CELLS as u16 {
             let mut next_frontier = CellSet::empty(self.grid);
             for cell in frontier.iter() {

@@ -1,30 +1,29 @@
-//! The envelope that the policy cannot leave: which actions are allowed here and now.
+//! The safety envelope: the actions that the policy may take in a given state.
 //!
-//! A move is allowed when it stays inside the fence and when the battery, after paying for it, still covers the
-//! way to the terminal cell plus a reserve:
+//! An action is allowed if it stays inside the fence and if the battery afterwards still covers the way to the terminal cell
+//! and a reserve:
 //!
 //! ```text
 //! b - cost(a) >= distance(p + a, terminal) + reserve          (paper, "safety controller")
 //! ```
 //!
 //! # Glossary
-//! - **fence**: the set of cells that may be flown over. It lies inside the map.
-//! - **distance**: moves on the shortest path to the terminal that stays inside the fence.
-//! - **way home**: battery units still needed to *end* the mission. That is the distance, except on the terminal
-//!   cell itself: a mission ends when a *move* enters the terminal, so from there it takes two moves, out and
-//!   back. (With the plain distance, a mission that starts on its terminal could hover until no move is
-//!   affordable any more, and never end.)
-//! - **feasible**: the battery covers way home plus reserve.
+//! - **fence**: the cells that the aircraft may fly over, a subset of the map.
+//! - **distance**: moves on the shortest path to the terminal inside the fence.
+//! - **way home**: battery units needed to *end* the mission. This is the distance, except on the terminal cell: a mission
+//!   ends when a *move* enters the terminal, so from there it takes two moves, out and back. With the distance instead, a
+//!   mission that starts on its terminal could hover until it can afford no move, and never end.
+//! - **feasible**: the battery covers way home and reserve.
 //!
 //! # The theorem
-//! From a feasible state at least one action is allowed, and every allowed action leads to a feasible state or
-//! ends the mission on the terminal with `b >= reserve`. By induction the terminal is always reached, whatever
-//! the policy answers. `tests/theorem.rs` walks every state of small grids and random walks of large ones.
+//! From a feasible state at least one action is allowed, and every allowed action leads to a feasible state or ends the
+//! mission on the terminal with `b >= reserve`. By induction every policy reaches the terminal. `tests/theorem.rs` checks
+//! every state of small grids and random walks on large ones.
 //!
 //! # When you may trust this
-//! The theorem speaks of the battery it is told and of cells. That a cell is really reached at the price of one
-//! unit is the pilot's to watch; when the battery falls faster than that, the state becomes infeasible, and then
-//! [`Guard::mask`] leaves only moves that shorten the way home. The guard does not know that learning exists.
+//! The theorem is about cells and the given battery level. Whether a move really costs one unit is monitored by the pilot.
+//! If the battery drains faster, the state becomes infeasible, and [`Guard::mask`] then allows only moves that shorten the
+//! way home. The guard does not depend on the policy.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -39,7 +38,7 @@ use core::fmt;
 use distance::DistanceField;
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet, Grid};
 
-/// Fence, terminal and reserve, with the distances worked out. About four kilobytes.
+/// Fence, terminal, reserve and distances. About four kilobytes.
 #[derive(Clone, Debug)]
 pub struct Guard {
     terminal: Cell,
@@ -47,12 +46,12 @@ pub struct Guard {
     distances: DistanceField,
 }
 
-/// Why there can be no envelope.
+/// Why an envelope is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GuardError {
     /// The terminal cell is outside the fence.
     TerminalOutsideFence,
-    /// No cell next to the terminal is inside the fence: no move can ever end the mission.
+    /// No neighbour of the terminal is inside the fence, so no move can end the mission.
     TerminalIsolated,
     /// The reserve is negative or not finite.
     Reserve,
@@ -63,7 +62,7 @@ impl fmt::Display for GuardError {
         f.write_str(match self {
             GuardError::TerminalOutsideFence => "the terminal cell is outside the fence",
             GuardError::TerminalIsolated => "no cell next to the terminal is inside the fence",
-            GuardError::Reserve => "the reserve is not a number of battery units >= 0",
+            GuardError::Reserve => "the reserve is not a finite number >= 0",
         })
     }
 }
@@ -71,7 +70,7 @@ impl fmt::Display for GuardError {
 impl core::error::Error for GuardError {}
 
 impl Guard {
-    /// An envelope without room: it allows nothing anywhere, until [`Guard::enclose`].
+    /// An envelope that allows no action, until [`Guard::enclose`].
     #[must_use]
     pub const fn closed() -> Guard {
         Guard {
@@ -81,13 +80,13 @@ impl Guard {
         }
     }
 
-    /// Works out the distances inside `fence`, a breadth-first search from `terminal`.
+    /// Computes the distances inside `fence` by breadth-first search from `terminal`.
     ///
     /// # Errors
     /// See [`GuardError`].
     ///
     /// # Cost
-    /// One visit per cell; 5 KB of stack, of which [`Guard::enclose`] needs one.
+    /// One visit for each cell, and 5 KB of stack ([`Guard::enclose`] needs 1 KB).
     pub fn new(fence: &CellSet, terminal: Cell, reserve: BatteryUnits) -> Result<Guard, GuardError> {
         check_reserve(reserve)?;
         let mut guard = Guard::closed();
@@ -96,13 +95,13 @@ impl Guard {
         Ok(guard)
     }
 
-    /// Changes fence and terminal, in place; the reserve stays. For a board, whose stack is short.
+    /// Changes fence and terminal in place and keeps the reserve. For boards with little stack.
     ///
     /// # Errors
-    /// As [`Guard::check`]; nothing changes.
+    /// As [`Guard::check`]; the envelope is then unchanged.
     ///
     /// # Cost
-    /// One visit per cell; 1 KB of stack.
+    /// One visit for each cell, and 1 KB of stack.
     pub fn enclose(&mut self, fence: &CellSet, terminal: Cell) -> Result<(), GuardError> {
         Guard::check(fence, terminal)?;
         self.terminal = terminal;
@@ -110,7 +109,7 @@ impl Guard {
         Ok(())
     }
 
-    /// Whether a mission inside `fence` can end at `terminal`.
+    /// Checks that a mission inside `fence` can end at `terminal`.
     ///
     /// # Errors
     /// [`GuardError::TerminalOutsideFence`], [`GuardError::TerminalIsolated`].
@@ -127,7 +126,7 @@ impl Guard {
     /// Changes the reserve (`GLN_RESERVE`).
     ///
     /// # Errors
-    /// [`GuardError::Reserve`]; the old value stays.
+    /// [`GuardError::Reserve`]; the reserve is then unchanged.
     pub fn set_reserve(&mut self, reserve: BatteryUnits) -> Result<(), GuardError> {
         check_reserve(reserve)?;
         self.reserve = reserve;
@@ -146,33 +145,33 @@ impl Guard {
         self.terminal
     }
 
-    /// The battery that is kept back.
+    /// The reserve.
     #[must_use]
     pub const fn reserve(&self) -> BatteryUnits {
         self.reserve
     }
 
-    /// Moves to the terminal on the shortest path inside the fence; `None` outside it or cut off from it.
+    /// Moves to the terminal on the shortest path inside the fence; `None` outside the fence or without a path.
     #[must_use]
     pub fn distance(&self, cell: Cell) -> Option<u16> {
         self.distances.at(cell)
     }
 
-    /// Battery units still needed to end the mission: the distance, and 2 on the terminal itself.
+    /// Battery units needed to end the mission: the distance, or 2 on the terminal.
     #[must_use]
     pub fn way_home(&self, cell: Cell) -> Option<BatteryUnits> {
         let distance = self.distance(cell)?;
         Some(BatteryUnits(if distance == 0 { 2.0 } else { f32::from(distance) }))
     }
 
-    /// Battery beyond the way to the terminal: the paper's b_SC, `b - distance`. The reserve is not taken off,
-    /// so that the policy sees the same number whatever the operator keeps back.
+    /// Battery beyond the distance to the terminal: the paper's b_SC, `b - distance`. Independent of the reserve, so that the
+    /// policy's input does not change with it.
     #[must_use]
     pub fn spare(&self, cell: Cell, battery: BatteryUnits) -> Option<BatteryUnits> {
         self.distance(cell).map(|distance| battery - BatteryUnits(f32::from(distance)))
     }
 
-    /// Whether the battery covers the way home and the reserve. Never for a battery that is not a number.
+    /// Whether the battery covers way home and reserve; `false` for NaN.
     #[must_use]
     pub fn is_feasible(&self, cell: Cell, battery: BatteryUnits) -> bool {
         self.way_home(cell).is_some_and(|needed| battery.0 >= (needed + self.reserve).0)
@@ -180,8 +179,8 @@ impl Guard {
 
     /// The actions allowed at `cell` with `battery` left.
     ///
-    /// From an infeasible state these are the moves that shorten the way (on the terminal: hover), the best that
-    /// is left to do. Empty only where [`Guard::distance`] is `None`.
+    /// In an infeasible state these are the moves that shorten the way home, or hover on the terminal. The mask is empty only
+    /// where [`Guard::distance`] is `None`.
     #[must_use]
     pub fn mask(&self, cell: Cell, battery: BatteryUnits) -> ActionMask {
         if !self.is_feasible(cell, battery) {
@@ -202,7 +201,7 @@ impl Guard {
         mask
     }
 
-    /// The first move that shortens the way to the terminal; `None` on the terminal and outside the fence.
+    /// The first move that shortens the way to the terminal; `None` on the terminal, and without a path to it.
     #[must_use]
     pub fn homeward(&self, cell: Cell) -> Option<Action> {
         self.homeward_moves(cell).iter().find(|&action| action != Action::Hover)

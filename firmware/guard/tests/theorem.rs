@@ -1,4 +1,4 @@
-//! The theorem of the crate's page, by exhaustion on small grids and by random walks on large ones.
+//! The theorem of the crate's page: exhaustive on small grids, random walks on large ones.
 
 use gleaner_guard::{Guard, GuardError};
 use gleaner_units::{Action, BatteryUnits, Cell, CellSet, Grid, Metres};
@@ -8,7 +8,7 @@ fn grid(width: u16, height: u16) -> Grid {
     Grid::new(width, height, Metres(20.0)).unwrap()
 }
 
-/// What must hold in one state; returns the feasible states that allowed actions lead to.
+/// Checks one state and returns the feasible states after each allowed action.
 fn check_state(guard: &Guard, cell: Cell, battery: f32) -> Vec<(Cell, f32)> {
     assert!(guard.is_feasible(cell, BatteryUnits(battery)), "{cell} {battery}");
     let mask = guard.mask(cell, BatteryUnits(battery));
@@ -31,8 +31,8 @@ fn check_state(guard: &Guard, cell: Cell, battery: f32) -> Vec<(Cell, f32)> {
     next_states
 }
 
-/// Every state reachable from every feasible start: each is feasible and has an allowed action, and the battery
-/// falls with every action, so every sequence of allowed actions ends on the terminal with b >= reserve.
+/// Checks every state that is reachable from a feasible start. The battery decreases with every action, so every sequence of
+/// allowed actions ends on the terminal with b >= reserve.
 fn exhaust(fence: &CellSet, terminal: Cell, reserve: f32, battery_half_units: u16) {
     let Ok(guard) = Guard::new(fence, terminal, BatteryUnits(reserve)) else { return };
     let grid = fence.grid();
@@ -56,7 +56,7 @@ fn exhaust(fence: &CellSet, terminal: Cell, reserve: f32, battery_half_units: u1
 }
 
 #[test]
-fn every_state_of_every_fence_of_a_3_by_3_grid() {
+fn theorem_holds_for_every_fence_of_a_3_by_3_grid() {
     let grid = grid(3, 3);
     for fence_bits in 0u32..512 {
         let mut fence = CellSet::empty(grid);
@@ -73,7 +73,7 @@ fn every_state_of_every_fence_of_a_3_by_3_grid() {
 }
 
 #[test]
-fn every_state_of_open_grids() {
+fn theorem_holds_on_open_grids() {
     for (width, height) in [(1, 2), (2, 1), (1, 7), (4, 3), (5, 5)] {
         let fence = CellSet::full(grid(width, height));
         for terminal in fence.grid().cells() {
@@ -85,8 +85,8 @@ fn every_state_of_open_grids() {
 }
 
 proptest! {
-    /// Random walks over the full grid with random holes, odd batteries and reserves, from a random feasible
-    /// start, choosing among the allowed actions by a random stream until the terminal is entered.
+    /// Random walks of allowed actions on grids with random holes, battery levels and reserves, from a random feasible
+    /// start to the terminal.
     #[test]
     fn random_walks_end_on_the_terminal(
         holes in prop::collection::vec((0i16..40, 0i16..30), 0..400),
@@ -126,18 +126,18 @@ proptest! {
 }
 
 #[test]
-fn starting_on_the_terminal_is_no_trap() {
+fn missions_may_start_on_the_terminal() {
     // The published predecessor allows only hovering when 0 < spare < 2 here, and never ends.
     let guard = Guard::new(&CellSet::full(grid(40, 30)), Cell::new(20, 15), BatteryUnits(0.0)).unwrap();
     let at_start = |battery| guard.mask(guard.terminal(), BatteryUnits(battery));
-    assert!(!at_start(2.0).allows(Action::Hover), "hovering would leave too little to go out and back");
-    assert_eq!(at_start(2.0).len(), 4, "out to any side and back");
+    assert!(!at_start(2.0).allows(Action::Hover), "after hovering, a move out and back is no longer covered");
+    assert_eq!(at_start(2.0).len(), 4, "one move out and back");
     assert!(at_start(2.5).allows(Action::Hover));
     assert!(!guard.is_feasible(guard.terminal(), BatteryUnits(1.5)));
 }
 
 #[test]
-fn an_infeasible_state_goes_straight_home() {
+fn infeasible_states_allow_only_homeward_moves() {
     let guard = Guard::new(&CellSet::full(grid(40, 30)), Cell::new(30, 18), BatteryUnits(2.0)).unwrap();
     for battery in [0.0, 20.0, f32::NAN, f32::NEG_INFINITY] {
         let mask = guard.mask(Cell::new(10, 6), BatteryUnits(battery));
@@ -149,8 +149,8 @@ fn an_infeasible_state_goes_straight_home() {
 }
 
 #[test]
-fn the_way_home_goes_around_a_fence() {
-    // A wall with one gap in the north.
+fn way_home_avoids_the_fence() {
+    // A wall with a gap in the north.
     let grid = grid(5, 5);
     let mut fence = CellSet::full(grid);
     for y in 0..4 {
@@ -163,7 +163,7 @@ fn the_way_home_goes_around_a_fence() {
 }
 
 #[test]
-fn impossible_envelopes_are_refused() {
+fn invalid_envelopes_are_refused() {
     let full = CellSet::full(grid(3, 3));
     let terminal = Cell::new(1, 1);
     let error = |fence: &CellSet, reserve| Guard::new(fence, terminal, BatteryUnits(reserve)).unwrap_err();
@@ -179,14 +179,14 @@ fn impossible_envelopes_are_refused() {
 }
 
 #[test]
-fn an_envelope_in_place_is_a_new_one_and_a_closed_one_allows_nothing() {
+fn enclosing_in_place_equals_a_new_guard() {
     let mut guard = Guard::closed();
     assert!(guard.mask(Cell::new(0, 0), BatteryUnits(100.0)).is_empty());
     guard.set_reserve(BatteryUnits(2.0)).unwrap();
     let large = CellSet::full(grid(40, 30));
     let mut small = CellSet::full(grid(7, 5));
     small.remove(Cell::new(3, 0));
-    // The second is smaller: nothing of the first may be left.
+    // The second is smaller: no state of the first may remain.
     for (fence, terminal) in [(large, Cell::new(30, 18)), (small, Cell::new(0, 0))] {
         guard.enclose(&fence, terminal).unwrap();
         assert_eq!(guard.enclose(&fence, Cell::new(-1, 0)), Err(GuardError::TerminalOutsideFence));

@@ -51,7 +51,7 @@ impl<'a> Scene<'a> {
     /// The cell under the aircraft and its offset from the centre in metres, when both are known.
     pub(crate) fn cell_under(&self) -> Option<(Cell, f32)> {
         let vehicle = self.vehicle();
-        let frame = GridFrame::new(self.mission.grid(), self.mission.corner, vehicle.origin?);
+        let frame = GridFrame::new(self.mission.grid(), self.mission.pose, vehicle.origin?);
         let position = vehicle.position?;
         let cell = frame.cell(&position)?;
         Some((cell, position.horizontal_distance(&frame.centre(cell, position.down_m)).0))

@@ -1,27 +1,39 @@
-//! The engine, chosen when a program of a host starts.
+//! The engine of a host program, selected at start.
 
-use crate::native::{AlignedBytes, MAGIC, Model, NativeError, NativePolicy, WeightFormat};
-use crate::onnx::{ConvertError, InferError, ModelCard, ModelError, TractPolicy, convert, unseal};
+use crate::native::{AlignedBytes, MAGIC, Model, NativeError, NativePolicy, SimdPolicy, WeightFormat};
+#[cfg(feature = "tract")]
+use crate::onnx::TractPolicy;
+use crate::onnx::{ConvertError, InferError, ModelCard, ModelError, convert, unseal};
 use crate::{Golden, Inference, Policy, Tokens, self_test};
+use gleaner_units::Action;
 use std::fmt;
 use std::str::FromStr;
 
 /// The engines of a host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineKind {
-    /// Runs the graph of the ONNX file, whatever its operators. The default: it reads what was trained as it is.
-    #[default]
+    /// Runs the graph of the ONNX file, whatever its operators. Needs the feature `tract`.
     Tract,
-    /// The one that flies on a microcontroller, with the same bits. Takes its own file, or the ONNX file, which it
-    /// then converts.
+    /// The default, because it is the fastest: the network of the microcontroller on the host's vector unit. Reads its own
+    /// file, or converts the ONNX file.
+    #[default]
     Native,
 }
 
 impl EngineKind {
-    /// Both.
+    /// All engines.
     pub const ALL: [EngineKind; 2] = [EngineKind::Tract, EngineKind::Native];
 
-    /// As it is written in flags, files and reports.
+    /// Whether this program contains the engine.
+    #[must_use]
+    pub const fn is_built(self) -> bool {
+        match self {
+            EngineKind::Tract => cfg!(feature = "tract"),
+            EngineKind::Native => true,
+        }
+    }
+
+    /// Name in flags, files and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -31,9 +43,9 @@ impl EngineKind {
     }
 }
 
-/// No engine has this name.
+/// The name is not that of an engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an engine is tract or native")]
+#[error("unknown engine: choose tract or native")]
 pub struct EngineNameError;
 
 impl FromStr for EngineKind {
@@ -44,7 +56,7 @@ impl FromStr for EngineKind {
     }
 }
 
-/// A model in the engine of choice, after it proved itself there.
+/// A model in the selected engine, after its self-test.
 pub struct Engine {
     name: String,
     version: String,
@@ -55,21 +67,24 @@ pub struct Engine {
 }
 
 enum Run {
+    #[cfg(feature = "tract")]
     Tract(Box<TractPolicy>),
-    Native(Box<NativePolicy<'static>>),
+    /// For processors without a supported vector unit.
+    Portable(Box<NativePolicy<'static>>),
+    Simd(Box<SimdPolicy>, WeightFormat),
 }
 
 impl Engine {
-    /// Reads a model, checks it and lets it prove itself on its golden pairs.
+    /// Reads and checks a model and runs the self-test.
     ///
-    /// The native engine's model stays in memory until the program ends: load one, not one a mission.
+    /// On a processor without a supported vector unit, a native model stays in memory until the program ends.
     ///
     /// # Errors
-    /// Anything that makes the model unfit to fly in this engine, see [`ModelError`].
+    /// [`ModelError`] for a model that must not fly in this engine.
     pub fn load_checked(bytes: &[u8], kind: EngineKind) -> Result<Engine, ModelError> {
         match kind {
             EngineKind::Tract if bytes.starts_with(&MAGIC) => Err(ModelError::NativeOnly),
-            EngineKind::Tract => Ok(Engine::tract(TractPolicy::load_checked(bytes)?)),
+            EngineKind::Tract => Engine::tract(bytes),
             EngineKind::Native if bytes.starts_with(&MAGIC) => Engine::native(bytes, None),
             EngineKind::Native => {
                 let blob = convert(bytes, WeightFormat::F32).map_err(|cause| match cause {
@@ -81,42 +96,61 @@ impl Engine {
         }
     }
 
-    fn tract(policy: TractPolicy) -> Engine {
+    #[cfg(not(feature = "tract"))]
+    fn tract(_: &[u8]) -> Result<Engine, ModelError> {
+        Err(ModelError::NoTract)
+    }
+
+    #[cfg(feature = "tract")]
+    fn tract(bytes: &[u8]) -> Result<Engine, ModelError> {
+        let policy = TractPolicy::load_checked(bytes)?;
         let info = policy.info().clone();
-        Engine {
+        Ok(Engine {
             name: info.card.name.clone(),
             version: info.card.version.clone(),
             sha256: info.sha256,
             card: Some(info.card),
             goldens: policy.goldens().to_vec(),
             run: Run::Tract(Box::new(policy)),
-        }
+        })
     }
 
     fn native(blob: &[u8], card: Option<ModelCard>) -> Result<Engine, ModelError> {
-        let model = Model::read(Box::leak(Box::new(AlignedBytes::new(blob))).as_slice())?;
-        let mut policy = NativePolicy::new(model, Box::leak(Box::default()));
-        self_test(&mut policy, model.goldens())?;
+        let bytes = AlignedBytes::new(blob);
+        let model = Model::read(bytes.as_slice())?;
+        let run = match SimdPolicy::new(&model) {
+            Some(mut policy) => {
+                self_test(&mut policy, model.goldens())?;
+                Run::Simd(Box::new(policy), model.format())
+            }
+            None => {
+                let model = Model::read(Box::leak(Box::new(bytes.clone())).as_slice())?;
+                let mut policy = NativePolicy::new(model, Box::leak(Box::default()));
+                self_test(&mut policy, model.goldens())?;
+                Run::Portable(Box::new(policy))
+            }
+        };
         Ok(Engine {
             name: model.name().into(),
             version: model.version().into(),
             sha256: model.source().iter().map(|byte| format!("{byte:02x}")).collect(),
             card,
             goldens: model.goldens().collect(),
-            run: Run::Native(Box::new(policy)),
+            run,
         })
     }
 
-    /// What runs.
+    /// Which engine it is.
     #[must_use]
     pub fn kind(&self) -> EngineKind {
         match self.run {
+            #[cfg(feature = "tract")]
             Run::Tract(_) => EngineKind::Tract,
-            Run::Native(_) => EngineKind::Native,
+            Run::Portable(_) | Run::Simd(..) => EngineKind::Native,
         }
     }
 
-    /// What people call the model.
+    /// Name of the model.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -128,19 +162,19 @@ impl Engine {
         &self.version
     }
 
-    /// SHA-256 of the ONNX file's content: the identity of the model, whatever the engine.
+    /// SHA-256 of the ONNX file's content, which identifies the model in every engine.
     #[must_use]
     pub fn sha256(&self) -> &str {
         &self.sha256
     }
 
-    /// Who made it; the native engine's own file does not say.
+    /// Origin of the model; the native engine's own file does not contain it.
     #[must_use]
     pub fn card(&self) -> Option<&ModelCard> {
         self.card.as_ref()
     }
 
-    /// What it has answered.
+    /// The golden pairs that it reproduced.
     #[must_use]
     pub fn goldens(&self) -> &[Golden] {
         &self.goldens
@@ -148,11 +182,17 @@ impl Engine {
 }
 
 impl fmt::Display for Engine {
-    /// The engine, and how it keeps the weights if it has a choice.
+    /// The engine, its instruction set and the format of its weights.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.run {
+            #[cfg(feature = "tract")]
             Run::Tract(_) => write!(f, "tract"),
-            Run::Native(policy) => write!(f, "native, weights {}", policy.model().format().name()),
+            Run::Portable(policy) => {
+                write!(f, "native, portable, weights {}", policy.model().format().name())
+            }
+            Run::Simd(policy, format) => {
+                write!(f, "native, {}, weights {}", policy.instruction_set(), format.name())
+            }
         }
     }
 }
@@ -162,11 +202,26 @@ impl Policy for Engine {
 
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, InferError> {
         match &mut self.run {
+            #[cfg(feature = "tract")]
             Run::Tract(policy) => policy.infer(tokens),
-            Run::Native(policy) => policy.infer(tokens).map_err(|error| match error {
-                NativeError::LocalMap { cells } => InferError::LocalMap { cells },
-                NativeError::NotFinite => InferError::NotFinite,
-            }),
+            Run::Portable(policy) => Ok(policy.infer(tokens)?),
+            Run::Simd(policy, _) => Ok(policy.infer(tokens)?),
+        }
+    }
+
+    fn logits(&mut self, tokens: &Tokens) -> Result<[f32; Action::COUNT], InferError> {
+        match &mut self.run {
+            Run::Simd(policy, _) => Ok(policy.logits(tokens)?),
+            _ => self.infer(tokens).map(|inference| inference.logits),
+        }
+    }
+}
+
+impl From<NativeError> for InferError {
+    fn from(error: NativeError) -> InferError {
+        match error {
+            NativeError::LocalMap { cells } => InferError::LocalMap { cells },
+            NativeError::NotFinite => InferError::NotFinite,
         }
     }
 }

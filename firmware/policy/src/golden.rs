@@ -1,4 +1,4 @@
-//! A model proves on board that it still is the model that was trained.
+//! Golden pairs and the self-test: the engine on board reproduces the trained model.
 
 use crate::{Inference, Policy, Tokens};
 use core::borrow::Borrow;
@@ -6,10 +6,10 @@ use core::fmt;
 use gleaner_units::Action;
 use serde::{Deserialize, Serialize};
 
-/// The largest difference of a logit from its golden value that is rounding and not another model.
+/// Largest difference between a logit and its golden value that rounding explains.
 pub const GOLDEN_TOLERANCE: f32 = 1e-4;
 
-/// Tokens and the logits they must give, computed by the trainer.
+/// Tokens and their logits, computed by the trainer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Golden {
     /// The input.
@@ -18,21 +18,21 @@ pub struct Golden {
     pub logits: [f32; Action::COUNT],
 }
 
-/// Why an engine may not fly.
+/// Why an engine must not fly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SelfTestError {
-    /// The model carries no golden pair: nothing was proven.
+    /// The model has no golden pair.
     NoGolden,
-    /// The engine gave no answer for this pair.
+    /// The engine failed on a pair.
     NoAnswer {
         /// Index of the golden pair.
         pair: usize,
     },
-    /// A logit differs by more than [`GOLDEN_TOLERANCE`], or is not a number.
+    /// A logit differs by more than [`GOLDEN_TOLERANCE`] or is NaN.
     Differs {
         /// Index of the golden pair.
         pair: usize,
-        /// The largest difference seen in it.
+        /// The largest difference in it.
         by: f32,
     },
 }
@@ -40,9 +40,9 @@ pub enum SelfTestError {
 impl fmt::Display for SelfTestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            SelfTestError::NoGolden => write!(f, "the model carries no golden pair"),
+            SelfTestError::NoGolden => write!(f, "the model has no golden pair"),
             SelfTestError::NoAnswer { pair } => {
-                write!(f, "the engine gives no answer for golden pair {pair}")
+                write!(f, "the engine fails on golden pair {pair}")
             }
             SelfTestError::Differs { pair, by } => {
                 write!(f, "golden pair {pair} differs by {by:e}, more than {GOLDEN_TOLERANCE:e}")
@@ -53,7 +53,7 @@ impl fmt::Display for SelfTestError {
 
 impl core::error::Error for SelfTestError {}
 
-/// Evaluates every golden pair and compares.
+/// Evaluates every golden pair and compares the logits.
 ///
 /// # Errors
 /// The first pair that fails, see [`SelfTestError`].
@@ -61,20 +61,20 @@ pub fn self_test<P: Policy>(
     policy: &mut P,
     goldens: impl IntoIterator<Item: Borrow<Golden>>,
 ) -> Result<(), SelfTestError> {
-    let mut proven = false;
+    let mut compared = false;
     for (pair, golden) in (0..usize::MAX).zip(goldens) {
         let golden = golden.borrow();
         let Inference { logits, .. } =
             policy.infer(&golden.tokens).map_err(|_| SelfTestError::NoAnswer { pair })?;
         let by = largest_difference(&logits, &golden.logits);
-        // Written so that NaN fails.
+        // In this form NaN fails.
         #[expect(clippy::neg_cmp_op_on_partial_ord)]
         if !(by <= GOLDEN_TOLERANCE) {
             return Err(SelfTestError::Differs { pair, by });
         }
-        proven = true;
+        compared = true;
     }
-    if proven { Ok(()) } else { Err(SelfTestError::NoGolden) }
+    if compared { Ok(()) } else { Err(SelfTestError::NoGolden) }
 }
 
 fn largest_difference(a: &[f32; Action::COUNT], b: &[f32; Action::COUNT]) -> f32 {
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn another_answer_is_found_and_measured() {
+    fn self_test_measures_the_difference() {
         let tokens = Tokens {
             uav: [0.0; 4],
             preference: [0.5; 2],

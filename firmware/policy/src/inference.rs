@@ -1,19 +1,27 @@
-//! What an engine answers.
+//! Engines and their outputs.
 
 use crate::{FIRST_DEVICE_TOKEN, Slots, TOKENS, Tokens};
 use gleaner_units::Action;
 
-/// Something that turns tokens into logits: an engine with a model in it.
+/// An engine with a model: it maps tokens to logits.
 pub trait Policy {
-    /// Why there is no answer.
+    /// Why an inference failed.
     type Error;
 
-    /// Evaluates the model. The same tokens give the same answer, whatever was asked before. An engine must
-    /// not read a clock, sleep or keep state between calls that changes answers.
+    /// Evaluates the model. The result depends on the tokens alone: an engine must not read a clock, sleep, or keep state
+    /// that changes results.
     ///
     /// # Errors
-    /// The engine failed; the logits are finite otherwise.
+    /// The engine failed. Otherwise all logits are finite.
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, Self::Error>;
+
+    /// The logits of [`Policy::infer`] alone. Engines that can skip the attention override it.
+    ///
+    /// # Errors
+    /// As [`Policy::infer`].
+    fn logits(&mut self, tokens: &Tokens) -> Result<[f32; Action::COUNT], Self::Error> {
+        self.infer(tokens).map(|inference| inference.logits)
+    }
 }
 
 impl<P: Policy> Policy for &mut P {
@@ -22,27 +30,31 @@ impl<P: Policy> Policy for &mut P {
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, P::Error> {
         (**self).infer(tokens)
     }
+
+    fn logits(&mut self, tokens: &Tokens) -> Result<[f32; Action::COUNT], P::Error> {
+        (**self).logits(tokens)
+    }
 }
 
-/// One answer of the model.
+/// The outputs of one inference.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inference {
     /// One per action, in contract order.
     pub logits: [f32; Action::COUNT],
-    /// Who looked at whom in the second layer.
+    /// Attention weights of the second layer.
     pub attention: Attention,
 }
 
-/// Attention of the second layer, mean over the heads: row = query, column = key. Each row of a token that is
-/// present sums to one; rows and columns of absent devices are zero.
+/// Attention weights of the second layer, averaged over the heads: row = query, column = key. The row of each present
+/// token sums to one; rows and columns of absent devices are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attention(pub [[f32; TOKENS]; TOKENS]);
 
 impl Attention {
-    /// Nobody looks at anybody.
+    /// All weights zero.
     pub const NONE: Attention = Attention([[0.0; TOKENS]; TOKENS]);
 
-    /// How much each token is looked at: the column sums (paper, attention map analysis).
+    /// Attention that each token receives: the column sums (paper, attention map analysis).
     #[must_use]
     pub fn received(&self) -> [f32; TOKENS] {
         let mut sums = [0.0; TOKENS];
@@ -54,7 +66,7 @@ impl Attention {
         sums
     }
 
-    /// The device that is looked at most, as its index in the mission; `None` without devices.
+    /// Mission index of the device that receives the most attention; `None` without devices.
     #[must_use]
     pub fn most_attended(&self, slots: &Slots) -> Option<u16> {
         let received = self.received();
@@ -71,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_most_attended_device_is_named_by_its_place_in_the_mission() {
+    fn most_attended_device_is_a_mission_index() {
         let mut attention = Attention::NONE;
         attention.0[0][FIRST_DEVICE_TOKEN] = 0.4;
         attention.0[1][FIRST_DEVICE_TOKEN + 1] = 0.3;

@@ -1,25 +1,26 @@
-//! The observation contract, the tokens, and the engines that turn them into logits.
+//! The observation contract, the tokens, and the engines that map them to logits.
 //!
-//! One builder makes the tokens for the trainer, the simulator and the aircraft, so what was trained is what
-//! flies. Physical units go in; every normalisation is inside the model's graph.
+//! Trainer, simulator and aircraft build the tokens with the same code, so training and flight see the same inputs.
+//! Inputs are in physical units; every normalisation is part of the model's graph.
 //!
 //! # Glossary
-//! - **situation**: what the aircraft knows when it decides, in the words of `units`.
-//! - **tokens**: the same as arrays of numbers in [`schema`] order: one for the aircraft, one for the preference,
-//!   one for the local map (what a stay would bring, here and around), one per device.
-//! - **preference**: how much data is worth against energy, `(w_data, w_energy)` with sum 1.
-//! - **logits**: one number per action, in contract order; the decision is [`gleaner_units::ActionMask::argmax`].
-//! - **attention**: how much each token looked at each other token in the second layer: the explanation we show.
-//! - **golden pair**: tokens and the outputs they must give; every model carries some.
+//! - **situation**: the aircraft's knowledge at a decision, in the types of `units`.
+//! - **tokens**: the situation as arrays in [`schema`] order: one token for the aircraft, one for the preference, one for
+//!   the local map (the yield of a stay here and around), one for each device.
+//! - **preference**: the weights of data and energy, `(w_data, w_energy)`, with sum 1.
+//! - **logits**: one number for each action, in contract order. The decision is [`gleaner_units::ActionMask::argmax`].
+//! - **attention**: the attention weights of the second layer: the explanation of a decision that programs show.
+//! - **golden pair**: tokens and their logits. Every model contains some.
 //!
 //! # When you may trust this
-//! [`Tokens`] built by [`Tokens::build`] are finite and inside the ranges of the schema whatever the situation
-//! says (a device heard with an SNR that is not a number counts as not heard). An engine's answer may be trusted
-//! after [`self_test`] passed with the model's own golden pairs.
+//! [`Tokens`] from [`Tokens::build`] are finite and inside the ranges of the schema for every situation (a device whose
+//! SNR is not finite counts as unheard). The output of an engine may be trusted after [`self_test`] passed with the
+//! model's golden pairs.
 //!
 //! # Features
-//! [`native`] is always there. `std` adds the tract engine, which loads the ONNX file on a host with an operating
-//! system, and the conversion of that file for the native engine.
+//! Without features the crate is `no_std` and has no heap: tokens and the portable [`native`] engine. `std` adds the
+//! vectorised native engine, the reading and conversion of ONNX files, and token tables. `tract` adds the tract engine,
+//! which runs any ONNX graph.
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -31,6 +32,7 @@
 mod golden;
 mod inference;
 pub mod native;
+mod outlook;
 pub mod schema;
 mod situation;
 mod timed;
@@ -43,6 +45,8 @@ mod yields;
 mod engine;
 #[cfg(feature = "std")]
 pub mod onnx;
+#[cfg(feature = "std")]
+mod token_table;
 
 #[cfg(feature = "std")]
 pub use engine::{Engine, EngineKind, EngineNameError};
@@ -50,12 +54,14 @@ pub use golden::{GOLDEN_TOLERANCE, Golden, SelfTestError, self_test};
 pub use inference::{Attention, Inference, Policy};
 pub use situation::{DeviceState, Preference, Situation};
 pub use timed::Timed;
+#[cfg(feature = "std")]
+pub use token_table::TokenTable;
 pub use tokens::{Slots, Tokens};
 pub use view::View;
 
-/// The most devices that the model sees at once.
+/// Most devices in one observation.
 pub const K_MAX: usize = 12;
-/// Patches along one side of the local map.
+/// Patches along a side of the local map.
 pub const LOCAL_MAP_SIDE: usize = 9;
 /// Patches of the local map.
 pub const LOCAL_MAP_CELLS: usize = LOCAL_MAP_SIDE * LOCAL_MAP_SIDE;

@@ -1,18 +1,18 @@
-//! What the aircraft knows when it decides.
+//! The inputs of a decision.
 
 use gleaner_units::{BatteryUnits, Cell, Db, Sight};
 use serde::{Deserialize, Serialize};
 
-/// How much data is worth against energy: `w_data` in 0..=1, energy gets the rest (paper, vector w).
+/// Weight of data against energy: `w_data` in 0..=1, and 1 - `w_data` for energy (paper, vector w).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Preference {
     w_data: f32,
 }
 
 impl Preference {
-    /// All for data.
+    /// Data only.
     pub const DATA: Preference = Preference { w_data: 1.0 };
-    /// All for energy.
+    /// Energy only.
     pub const ENERGY: Preference = Preference { w_data: 0.0 };
 
     /// The preference with this weight of data; `None` for NaN and outside 0..=1.
@@ -34,30 +34,30 @@ impl Preference {
     }
 }
 
-/// One ground device as it is known now.
+/// Current knowledge of one ground device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceState {
-    /// Where it stands.
+    /// Its cell.
     pub cell: Cell,
-    /// Data still to collect, data units: the last that was reported, at first what the mission says.
+    /// Data still to collect, data units: the last report, before that the mission's figure.
     pub remaining: f32,
-    /// SNR of a report that is fresh enough; `None` when it is not heard.
+    /// SNR of a fresh report; `None` without one.
     pub snr: Option<Db>,
 }
 
-/// Everything a decision depends on.
+/// Everything that a decision depends on, except the devices.
 #[derive(Clone, Copy)]
 pub struct Situation<'a> {
-    /// The cell that the aircraft is in.
+    /// The aircraft's cell.
     pub cell: Cell,
     /// Battery left.
     pub battery: BatteryUnits,
-    /// Battery beyond the way to the terminal, `b - distance` (paper, b_SC).
+    /// Battery beyond the distance to the terminal, `b - distance` (paper, b_SC).
     pub spare: BatteryUnits,
     /// The cell that ends the mission.
     pub terminal: Cell,
     /// The operator's preference.
     pub preference: Preference,
-    /// The city from flight altitude: who is seen from where.
+    /// Line of sight between ground and flight altitude.
     pub sight: &'a dyn Sight,
 }

@@ -1,48 +1,49 @@
 //! From a situation to the arrays that enter the model.
 
-use crate::schema::{REACHABLE_SNR_DB, SNR_NOT_HEARD_DB};
-use crate::vantage::vantage;
-use crate::yields::YieldMap;
+use crate::outlook::{Direct, Outlook};
+use crate::schema::{DEVICE_FEATURES, PREFERENCE_FEATURES, REACHABLE_SNR_DB, SNR_NOT_HEARD_DB, UAV_FEATURES};
 use crate::{DeviceState, K_MAX, LOCAL_MAP_CELLS, Situation};
 use gleaner_units::Cell;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Numbers of the aircraft's token.
-pub(crate) const UAV_FEATURES: usize = 4;
-/// Numbers of a device's token.
-pub(crate) const DEVICE_FEATURES: usize = 7;
-
 /// The model's input in physical units, in [`crate::schema`] order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tokens {
-    /// Spare battery, battery (battery units), terminal east, north (m).
+    /// Spare battery, battery (battery units), terminal east, terminal north (m).
     pub uav: [f32; UAV_FEATURES],
     /// `w_data`, `w_energy`.
-    pub preference: [f32; 2],
-    /// What a stay would bring here and around (data units), south-west first, row by row; the terminal beside.
+    pub preference: [f32; PREFERENCE_FEATURES],
+    /// Yield of a stay around the aircraft (data units), row by row from the south-west; marks the terminal.
     pub local_map: Vec<f32, LOCAL_MAP_CELLS>,
-    /// East, north (m), remaining (data units), SNR (dB), reachable, vantage east, vantage north (m): the devices that are
-    /// present.
+    /// For each device present: east, north (m), remaining (data units), SNR (dB), reachable, vantage east, vantage
+    /// north (m).
     pub devices: Vec<[f32; DEVICE_FEATURES], K_MAX>,
 }
 
-/// Which device of the mission stands in which device token: the index into the list given to
-/// [`Tokens::build`].
+/// The mission's device in each device token: its index in the list given to [`Tokens::build`].
 pub type Slots = Vec<u16, K_MAX>;
 
 impl Tokens {
-    /// The tokens of a situation, and which device went into which token.
+    /// Builds the tokens of a situation, and the list of devices that they describe.
     ///
-    /// With more than [`K_MAX`] devices, those with the highest SNR are seen, of equals (all that are not heard)
-    /// the nearest. Devices keep their order.
+    /// Of more than [`K_MAX`] devices, those with the highest SNR are kept, and at equal SNR (all unheard devices) the
+    /// nearest. Devices keep their order.
     ///
     /// # Cost
-    /// For each device that has data left, a ray for each cell where it may be heard (with a table of sight, a look);
-    /// no heap, two kilobytes of stack.
+    /// One line-of-sight test for each cell within range of each device that has data left, and two kilobytes of stack.
+    /// A host with memory to spare uses a `TokenTable` (feature `std`) instead.
     pub fn build(
         situation: &Situation<'_>,
         devices: impl IntoIterator<Item = DeviceState>,
+    ) -> (Tokens, Slots) {
+        Tokens::assemble(situation, devices, &mut Direct::new(situation.sight, situation.cell))
+    }
+
+    pub(crate) fn assemble(
+        situation: &Situation<'_>,
+        devices: impl IntoIterator<Item = DeviceState>,
+        outlook: &mut impl Outlook,
     ) -> (Tokens, Slots) {
         let cell_m = situation.sight.grid().cell().0;
         let offset_m = |to: Cell| {
@@ -57,14 +58,12 @@ impl Tokens {
             devices: Vec::new(),
         };
         let mut slots = Slots::new();
-        let mut yields = YieldMap::new(situation.sight, situation.cell);
         for (index, device) in (0..=u16::MAX).zip(devices) {
-            yields.add(&device);
+            outlook.add(&device);
             let [east_m, north_m] = offset_m(device.cell);
             let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
             let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
-            let vantage = vantage(situation.sight, device.cell, situation.cell);
-            let [vantage_east_m, vantage_north_m] = vantage.map(|cells| cells * cell_m);
+            let [vantage_east_m, vantage_north_m] = outlook.vantage(device.cell).map(|cells| cells * cell_m);
             let token = [
                 east_m,
                 north_m,
@@ -81,7 +80,7 @@ impl Tokens {
                 let _ = slots.push(index);
             }
         }
-        tokens.local_map = yields.patches(situation.terminal);
+        tokens.local_map = outlook.patches(situation.terminal);
         (tokens, slots)
     }
 }
@@ -94,7 +93,7 @@ fn precedes(a: &[f32; DEVICE_FEATURES], b: &[f32; DEVICE_FEATURES]) -> bool {
     rank(a) > rank(b)
 }
 
-/// Puts `token` in place of the weakest one if it is stronger; later devices stay behind earlier ones.
+/// Replaces the weakest device by `token` if `token` is stronger. The devices stay in mission order.
 fn replace_weakest(
     tokens: &mut Vec<[f32; DEVICE_FEATURES], K_MAX>,
     slots: &mut Slots,
@@ -106,7 +105,7 @@ fn replace_weakest(
         .reduce(|worst, next| if precedes(next.1, worst.1) { worst } else { next })
         .filter(|(_, weakest)| precedes(&token, weakest))
         .map(|(slot, _)| slot);
-    // Both lists are as long as each other; without saying so, a panic would stay in the image.
+    // Always true. Without the test a panic would remain in the board's image.
     if let Some(slot) = weakest.filter(|&slot| slot < tokens.len() && slot < slots.len()) {
         tokens.remove(slot);
         slots.remove(slot);
@@ -138,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn offsets_are_metres_east_and_north_and_absence_has_one_meaning() {
+    fn offsets_in_metres_and_values_of_absent_quantities() {
         let heights = city();
         let sight = Rays { heights: &heights, altitude_m: 60 };
         let heard = DeviceState { cell: Cell::new(11, 4), remaining: 6000.0, snr: Some(Db(5.0)) };
@@ -154,20 +153,20 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_heard_is_in_the_yield_map_all_the_same() {
+    fn yield_map_includes_unheard_devices() {
         let heights = city();
         let sight = Rays { heights: &heights, altitude_m: 60 };
         let unheard = DeviceState { cell: Cell::new(10, 6), remaining: 6000.0, snr: None };
         let (tokens, _) = Tokens::build(&situation(&sight, 10, 6), [unheard]);
         assert_eq!(tokens.local_map.len(), LOCAL_MAP_CELLS);
-        assert_eq!(tokens.local_map[LOCAL_MAP_CELLS / 2], 5952.0, "right here, in steps of 64");
+        assert_eq!(tokens.local_map[LOCAL_MAP_CELLS / 2], 5952.0, "above the device, in steps of 64");
         let (empty, _) = Tokens::build(&situation(&sight, 10, 6), []);
         assert_eq!(empty.local_map, [0.0; LOCAL_MAP_CELLS]);
     }
 
     proptest! {
         #[test]
-        fn of_too_many_devices_the_strongest_are_seen(
+        fn strongest_devices_are_kept(
             snrs in prop::collection::vec(prop::option::of(-30i16..25), 0..40),
         ) {
             let heights = city();
@@ -188,7 +187,7 @@ mod tests {
                 (device.snr.map_or(SNR_NOT_HEARD_DB, |snr| snr.0), -(device.cell.x - 10).abs())
             };
             for (slot, token) in slots.iter().zip(&tokens.devices) {
-                prop_assert_eq!(f32::from(*slot), token[2], "slot names the device in the token");
+                prop_assert_eq!(f32::from(*slot), token[2], "the slot is the index of the device in the token");
             }
             for (index, unseen) in devices.iter().enumerate().filter(|(i, _)| !slots.contains(&(*i as u16))) {
                 for &slot in &slots {

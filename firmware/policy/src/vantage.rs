@@ -1,23 +1,24 @@
-//! The vantage of a device: the place to fly to for it.
+//! The vantage of a device: the cell from which to collect its data.
 //!
-//! Where a device stands says little of where it is heard: a tower next to it hides it from half of the city. Map and
-//! channel are known on board, so the builder works out the nearest cell from which a device is in sight and close
-//! enough to send fast. Where that is, and how many moves away, is what a mission is planned by.
+//! The position of a device says little about where it can be received: one tower beside it hides it from half of the
+//! city. The vantage is the nearest cell to the aircraft with line of sight to the device and a fast link, so its offset
+//! and its distance in moves are direct inputs for planning.
 
 use crate::yields::units_per_slot;
 use gleaner_units::{Cell, Sight};
 
-/// Data units that a slot at a vantage carries, at least.
+/// Lowest data rate of a vantage, data units per slot.
 const FAST_UNITS: f32 = 400.0;
-/// So many cells away a device is never that fast at the lowest altitude, 20 m, and cells of 20 m.
+/// Search radius, cells. Farther away the rate is lower even at an altitude of 20 m and with cells of 20 m.
 const REACH: i16 = 7;
 
-/// East and north offset, cells, of the nearest vantage of the device at `device` from the aircraft at `from`, the
-/// fastest of those that are as near; of several as fast the middle, so that a mirrored city has the mirrored vantage.
-/// Without one, the device itself.
+/// East and north offset, in cells, from the aircraft at `from` to the vantage of the device at `device`.
+///
+/// Of equally near cells the one closest to the device counts. Of several equal ones the mean is returned, so that a
+/// mirrored city gives the mirrored vantage. A device without a vantage is its own.
 ///
 /// # Cost
-/// At most one ray for each of the 149 cells around the device, only for those that are as near as the best so far.
+/// At most one line-of-sight test for each of the 149 cells around the device.
 pub(crate) fn vantage(sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;
@@ -65,18 +66,18 @@ mod tests {
     }
 
     #[test]
-    fn over_open_ground_it_is_as_far_as_the_rate_reaches() {
-        // 400 units a slot: 21,900 m2 in space, six cells and a half on the ground.
+    fn open_ground_vantage_is_limited_by_the_rate() {
+        // 400 units a slot: 21,900 m2 in space, 6.5 cells on the ground.
         assert_eq!(seen(&flat(), (20, 15), (20, 15)), [0.0, 0.0]);
-        assert_eq!(seen(&flat(), (20, 15), (24, 15)), [0.0, 0.0], "it is one already");
+        assert_eq!(seen(&flat(), (20, 15), (24, 15)), [0.0, 0.0], "the aircraft is at a vantage");
         assert_eq!(seen(&flat(), (20, 15), (30, 15)), [-4.0, 0.0]);
         assert_eq!(seen(&flat(), (20, 15), (20, 0)), [0.0, 9.0]);
-        // From the diagonal (4, 5) and (5, 4) are equally near and fast: the middle.
+        // From the diagonal (4, 5) and (5, 4) are equally near and fast: the mean.
         assert_eq!(seen(&flat(), (20, 15), (30, 25)), [-5.5, -5.5]);
     }
 
     #[test]
-    fn a_wall_hides_what_is_near_and_the_edge_of_the_map_is_the_end() {
+    fn walls_and_map_edges_limit_the_vantage() {
         let mut heights = flat();
         for y in 0..30 {
             heights.set(Cell::new(21, y), 50);
@@ -87,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn no_vantage_at_all_is_the_device() {
+    fn device_without_a_vantage_is_its_own() {
         let heights = flat();
         let rays = |altitude_m| Rays { heights: &heights, altitude_m };
         assert_eq!(vantage(&rays(200), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);

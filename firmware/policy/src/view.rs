@@ -1,12 +1,11 @@
-//! The symmetries of the grid: a situation may be turned and mirrored, and the best action turns with it.
+//! The symmetries of the grid: rotating or mirroring a situation does the same to its best action.
 //!
-//! North is nothing special to a policy that sees offsets and what is heard around it. So the trainer shows it missions
-//! turned and mirrored, and it learns to fly to the north what it has flown to the east. In flight there is one view, the
-//! plain one.
+//! The inputs of the policy are offsets and coverage, which have no preferred direction. The trainer therefore presents
+//! rotated and mirrored missions, so that experience in one direction serves all. In flight only the identity is used.
 
 use gleaner_units::Action;
 
-/// One of the eight symmetries of a square: mirrored or not along each axis, then the axes exchanged or not.
+/// One of the eight symmetries of a square: an optional mirroring of each axis, then an optional exchange of the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct View {
     mirrors_east: bool,
@@ -15,7 +14,7 @@ pub struct View {
 }
 
 impl View {
-    /// All of them; the first changes nothing.
+    /// All symmetries; the first is the identity.
     pub const ALL: [View; 8] = [
         View::numbered(0),
         View::numbered(1),
@@ -31,7 +30,7 @@ impl View {
         View { mirrors_east: bits & 1 != 0, mirrors_north: bits & 2 != 0, exchanges: bits & 4 != 0 }
     }
 
-    /// Where this offset (east, north) lies in the view.
+    /// The image of an offset (east, north).
     #[must_use]
     pub fn offset(self, [east, north]: [f32; 2]) -> [f32; 2] {
         let east = if self.mirrors_east { -east } else { east };
@@ -39,7 +38,7 @@ impl View {
         if self.exchanges { [north, east] } else { [east, north] }
     }
 
-    /// Where the number at (column, row) of a square map with this side lies in the view.
+    /// The image of (column, row) in a square map of `side` columns.
     #[must_use]
     pub const fn place(self, [column, row]: [usize; 2], side: usize) -> [usize; 2] {
         let column = if self.mirrors_east { side - 1 - column } else { column };
@@ -47,7 +46,7 @@ impl View {
         if self.exchanges { [row, column] } else { [column, row] }
     }
 
-    /// What this action is called in the view.
+    /// The image of an action.
     #[must_use]
     pub fn action(self, action: Action) -> Action {
         let mirrored = match action {
@@ -82,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn actions_offsets_and_maps_turn_together() {
+    fn actions_offsets_and_maps_transform_alike() {
         for view in View::ALL {
             for action in Action::ALL {
                 let [east, north] = step(action);
@@ -96,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_eight_and_the_first_is_plain() {
+    fn eight_distinct_views_beginning_with_the_identity() {
         let images = View::ALL.map(|view| view.offset([1.0, 2.0]));
         for (index, image) in images.iter().enumerate() {
             assert!(!images[..index].contains(image));

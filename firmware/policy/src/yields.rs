@@ -1,36 +1,37 @@
-//! The yield map: what a stay would bring, here and around.
+//! The yield map: data units that a stay of ten slots would collect, at the aircraft's cell and around it.
 //!
-//! The paper's local map shows buildings, and leaves it to the network to work out who is heard from where. But map,
-//! channel and devices are known on board, so the builder works it out: for every cell within 15 of the aircraft, the
-//! data that ten slots of hovering there would bring from each device alone, added up. Where two streets cross and
-//! three devices are in sight, the map is bright.
+//! The paper's local map shows buildings and leaves radio coverage to the network. Map, channel model and devices are
+//! known on board, so the builder computes coverage instead: for each cell within 15 cells of the aircraft, the sum over
+//! the devices of what ten slots of hovering there would collect from that device alone.
 //!
-//! The network sees [`LOCAL_MAP_SIDE`] by [`LOCAL_MAP_SIDE`] numbers, fine near the aircraft and coarse far away: per
-//! axis the bands -15..-8, -7..-4, -3..-2, -1, 0, 1, 2..3, 4..7, 8..15, and of each patch its best cell.
+//! The network receives [`LOCAL_MAP_SIDE`] x [`LOCAL_MAP_SIDE`] patches, fine near the aircraft and coarse far away. The
+//! bands of each axis are -15..-8, -7..-4, -3..-2, -1, 0, 1, 2..3, 4..7, 8..15; a patch holds the largest value of its
+//! cells.
 //!
-//! The terminal, when it is one of the eight cells around, stands in the map as [`TERMINAL_UNITS`]: a move there ends
-//! the mission. In its offset alone, which is scaled for the whole city, one cell is too little to be seen: policies
-//! flew over their base in the middle of a mission, and it was over.
+//! If the terminal is one of the eight neighbouring cells, its patch holds [`TERMINAL_UNITS`], because a move there ends
+//! the mission. The terminal's offset alone does not show this: it is scaled for the whole city, so one cell is a small
+//! number, and policies without the mark entered the terminal by mistake.
 
 use crate::schema::{TERMINAL_UNITS, YIELD_STEP_UNITS};
 use crate::{DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
 use gleaner_units::{Cell, Sight};
 use heapless::Vec;
 
-/// How far the map reaches, cells.
-const REACH: i16 = 15;
-const WINDOW: usize = 2 * REACH as usize + 1;
+/// Radius of the map, cells.
+pub(crate) const REACH: i16 = 15;
+/// Cells along one side of the window.
+pub(crate) const WINDOW: usize = 2 * REACH as usize + 1;
 /// First and last offset of each band, cells.
 const BANDS: [(i16, i16); LOCAL_MAP_SIDE] =
     [(-15, -8), (-7, -4), (-3, -2), (-1, -1), (0, 0), (1, 1), (2, 3), (4, 7), (8, 15)];
-/// The stay that a yield is of, slots.
+/// Length of the stay, slots.
 const SLOTS: f32 = 10.0;
 const STEPS_MAX: u16 = 255;
 
-/// Data units that a slot carries with line of sight, by the square of the distance in space, one entry every
-/// [`TABLE_STEP_M2`]: `100 log2(1 + SNR)`, SNR = 66 dB - 25 log10(d), nothing below 5 dB (paper, eq. 6 and table of
-/// simulation parameters; its noise, which the paper leaves open, as in the simulated world). The first entry is that
-/// of the lowest flight altitude, 20 m.
+/// Data units per slot with line of sight, by the square of the 3-D distance in steps of [`TABLE_STEP_M2`]:
+/// `100 log2(1 + SNR)` with SNR = 66 dB - 25 log10(d), and 0 below 5 dB (paper, eq. 6 and the table of simulation
+/// parameters; the paper leaves the noise level open, this is the simulated world's). The first entry is computed at the
+/// lowest flight altitude, 20 m.
 const UNITS_PER_SLOT: [u16; 64] = [
     1112, 914, 789, 717, 665, 626, 593, 566, 542, 522, 503, 486, 471, 457, 445, 433, 422, 412, 402, 393, 384,
     376, 368, 361, 354, 347, 341, 334, 329, 323, 317, 312, 307, 302, 298, 293, 289, 284, 280, 276, 272, 269,
@@ -38,10 +39,10 @@ const UNITS_PER_SLOT: [u16; 64] = [
     206,
 ];
 const TABLE_STEP_M2: f32 = 1200.0;
-/// Where the table ends: nothing is heard from farther away.
+/// End of the table: devices farther away are out of range.
 const RANGE_M2: f32 = TABLE_STEP_M2 * (UNITS_PER_SLOT.len() - 1) as f32;
 
-/// Data units per slot at this distance squared: the table, with straight lines between its entries.
+/// Data units per slot at this squared distance, linearly interpolated.
 pub(crate) fn units_per_slot(distance_m2: f32) -> f32 {
     let place = distance_m2 / TABLE_STEP_M2;
     let index = place as usize;
@@ -52,75 +53,92 @@ pub(crate) fn units_per_slot(distance_m2: f32) -> f32 {
     near + (far - near) * (place - index as f32)
 }
 
-/// What is heard around the aircraft, while the devices are added one by one.
-pub(crate) struct YieldMap<'a> {
-    sight: &'a dyn Sight,
-    center: Cell,
-    /// Data units by north and east offset, the south-west corner first.
-    units: [[u16; WINDOW]; WINDOW],
+/// What ten slots at `cell` collect from a device with unlimited data; `None` out of range or out of sight.
+#[cfg(feature = "std")]
+pub(crate) fn stay_units(sight: &dyn Sight, device: Cell, cell: Cell) -> Option<f32> {
+    let grid = sight.grid();
+    let cell_m2 = grid.cell().0 * grid.cell().0;
+    let height_m2 = sight.altitude().0 * sight.altitude().0;
+    let square_m2 = |cell: i16, device: i16| {
+        let cells = f32::from(cell) - f32::from(device);
+        cells * cells * cell_m2
+    };
+    let distance_m2 = square_m2(cell.y, device.y) + height_m2 + square_m2(cell.x, device.x);
+    (distance_m2 < RANGE_M2 && grid.contains(cell) && sight.sees(device, cell))
+        .then(|| SLOTS * units_per_slot(distance_m2))
 }
 
-impl<'a> YieldMap<'a> {
-    pub(crate) const fn new(sight: &'a dyn Sight, center: Cell) -> YieldMap<'a> {
-        YieldMap { sight, center, units: [[0; WINDOW]; WINDOW] }
+/// Adds what one device would send to each cell of the window around `center`: data units by north and east offset,
+/// the south-west corner first.
+///
+/// # Cost
+/// At most one line-of-sight test for each cell within range of both the aircraft and the device.
+pub(crate) fn add<const COLUMNS: usize>(
+    window: &mut [[u16; COLUMNS]; WINDOW],
+    sight: &dyn Sight,
+    center: Cell,
+    device: &DeviceState,
+) {
+    if device.remaining.is_nan() || device.remaining <= 0.0 {
+        return;
     }
-
-    /// Adds what one device would send.
-    ///
-    /// # Cost
-    /// At most one ray for each cell within reach of both the aircraft and the device.
-    pub(crate) fn add(&mut self, device: &DeviceState) {
-        if device.remaining.is_nan() || device.remaining <= 0.0 {
-            return;
+    let grid = sight.grid();
+    let cell_m2 = grid.cell().0 * grid.cell().0;
+    let height_m2 = sight.altitude().0 * sight.altitude().0;
+    let square_m2 = |offset: i16, aircraft: i16, device: i16| {
+        let cells = f32::from(offset) + (f32::from(aircraft) - f32::from(device));
+        cells * cells * cell_m2
+    };
+    let Cell { x, y } = center;
+    for (line, north) in window.iter_mut().zip(-REACH..) {
+        let row_m2 = square_m2(north, y, device.cell.y) + height_m2;
+        if row_m2 >= RANGE_M2 {
+            continue;
         }
-        let grid = self.sight.grid();
-        let cell_m2 = grid.cell().0 * grid.cell().0;
-        let height_m2 = self.sight.altitude().0 * self.sight.altitude().0;
-        let square_m2 = |offset: i16, aircraft: i16, device: i16| {
-            let cells = f32::from(offset) + (f32::from(aircraft) - f32::from(device));
-            cells * cells * cell_m2
-        };
-        let Cell { x, y } = self.center;
-        for (line, north) in self.units.iter_mut().zip(-REACH..) {
-            let row_m2 = square_m2(north, y, device.cell.y) + height_m2;
-            if row_m2 >= RANGE_M2 {
+        for (units, east) in line.iter_mut().zip(-REACH..=REACH) {
+            let distance_m2 = row_m2 + square_m2(east, x, device.cell.x);
+            if distance_m2 >= RANGE_M2 {
                 continue;
             }
-            for (units, east) in line.iter_mut().zip(-REACH..) {
-                let distance_m2 = row_m2 + square_m2(east, x, device.cell.x);
-                if distance_m2 >= RANGE_M2 {
-                    continue;
-                }
-                let cell = Cell::new(x.saturating_add(east), y.saturating_add(north));
-                if grid.contains(cell) && self.sight.sees(device.cell, cell) {
-                    let stay = SLOTS * units_per_slot(distance_m2);
-                    // Never more than ten times a table entry.
-                    *units = units.saturating_add(stay.min(device.remaining) as u16);
-                }
+            let cell = Cell::new(x.saturating_add(east), y.saturating_add(north));
+            if grid.contains(cell) && sight.sees(device.cell, cell) {
+                let stay = SLOTS * units_per_slot(distance_m2);
+                // At most ten times a table entry.
+                *units = units.saturating_add(stay.min(device.remaining) as u16);
             }
         }
     }
+}
 
-    /// The numbers that enter the model: data units, south-west first, row by row.
-    pub(crate) fn patches(&self, terminal: Cell) -> Vec<f32, LOCAL_MAP_CELLS> {
-        let mut patches = Vec::new();
-        let (x, y) = (terminal.x.saturating_sub(self.center.x), terminal.y.saturating_sub(self.center.y));
-        let is_beside = (x, y) != (0, 0);
-        let band = |(first, last): (i16, i16)| (REACH + first) as usize..=(REACH + last) as usize;
-        for north in BANDS {
-            for east in BANDS {
-                if is_beside && east == (x, x) && north == (y, y) {
-                    let _ = patches.push(TERMINAL_UNITS);
-                    continue;
-                }
-                let lines = self.units.get(band(north)).into_iter().flatten();
-                let best = lines.flat_map(|line| line.get(band(east)).into_iter().flatten()).max();
-                let steps = (best.copied().unwrap_or(0) / YIELD_STEP_UNITS).min(STEPS_MAX);
-                let _ = patches.push(f32::from(steps * YIELD_STEP_UNITS));
+/// The local map of a window around `center`: data units, row by row from the south-west.
+pub(crate) fn patches<const COLUMNS: usize>(
+    window: &[[u16; COLUMNS]; WINDOW],
+    center: Cell,
+    terminal: Cell,
+) -> Vec<f32, LOCAL_MAP_CELLS> {
+    let mut patches = Vec::new();
+    let (x, y) = (terminal.x.saturating_sub(center.x), terminal.y.saturating_sub(center.y));
+    let is_beside = (x, y) != (0, 0);
+    let band = |(first, last): (i16, i16)| (REACH + first) as usize..=(REACH + last) as usize;
+    for north in BANDS {
+        // Column by column first: one pass over the rows of the band.
+        let mut largest = [0; COLUMNS];
+        for line in window.get(band(north)).into_iter().flatten() {
+            for (largest, units) in largest.iter_mut().zip(line) {
+                *largest = (*largest).max(*units);
             }
         }
-        patches
+        for east in BANDS {
+            if is_beside && east == (x, x) && north == (y, y) {
+                let _ = patches.push(TERMINAL_UNITS);
+                continue;
+            }
+            let best = largest.get(band(east)).into_iter().flatten().max();
+            let steps = (best.copied().unwrap_or(0) / YIELD_STEP_UNITS).min(STEPS_MAX);
+            let _ = patches.push(f32::from(steps * YIELD_STEP_UNITS));
+        }
     }
+    patches
 }
 
 #[cfg(test)]
@@ -134,9 +152,9 @@ mod tests {
 
     fn map(heights: &HeightMap, devices: &[DeviceState]) -> std::vec::Vec<f32> {
         let rays = Rays { heights, altitude_m: 60 };
-        let mut map = YieldMap::new(&rays, Cell::new(20, 15));
-        devices.iter().for_each(|device| map.add(device));
-        map.patches(Cell::new(0, 0)).to_vec()
+        let (mut window, center) = ([[0; WINDOW]; WINDOW], Cell::new(20, 15));
+        devices.iter().for_each(|device| add(&mut window, &rays, center, device));
+        patches(&window, center, Cell::new(0, 0)).to_vec()
     }
 
     fn at(map: &[f32], column: usize, row: usize) -> f32 {
@@ -144,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_the_formula() {
+    fn table_matches_the_formula() {
         for (index, &entry) in UNITS_PER_SLOT.iter().enumerate().take(63).skip(1) {
             let distance_m2 = index as f32 * TABLE_STEP_M2;
             let snr_db = 66.0 - 12.5 * libm::log10f(distance_m2);
@@ -160,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn bands_cover_the_window_once_and_mirror_each_other() {
+    fn bands_partition_the_window_symmetrically() {
         let mut next = -REACH;
         for (first, last) in BANDS {
             assert_eq!(first, next);
@@ -173,10 +191,10 @@ mod tests {
     }
 
     #[test]
-    fn a_stay_brings_ten_slots_or_what_is_left() {
+    fn yield_is_ten_slots_or_the_remaining_data() {
         let flat = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
         let full = map(&flat, &[device(20, 15, 8000.0)]);
-        // Right above: 717 units a slot, in steps of 64.
+        // Above the device: 717 units a slot, in steps of 64.
         assert_eq!(at(&full, 4, 4), 7168.0);
         assert!(at(&full, 5, 4) < 7168.0 && at(&full, 5, 4) == at(&full, 3, 4));
         // The nearest cell of the farthest band is 8 moves away.
@@ -193,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn buildings_and_the_edge_of_the_map_are_dark() {
+    fn yield_is_zero_behind_buildings_and_outside() {
         let mut heights = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
         for y in 0..30 {
             heights.set(Cell::new(21, y), 50);
@@ -202,28 +220,26 @@ mod tests {
         assert!(at(&map, 3, 4) > 0.0, "west of the wall");
         assert_eq!(at(&map, 6, 4), 0.0, "behind the wall");
         let rays = Rays { heights: &heights, altitude_m: 60 };
-        let mut corner = YieldMap::new(&rays, Cell::new(0, 0));
-        corner.add(&device(0, 0, 8000.0));
-        let patches = corner.patches(Cell::new(30, 18));
+        let (mut window, corner) = ([[0; WINDOW]; WINDOW], Cell::new(0, 0));
+        add(&mut window, &rays, corner, &device(0, 0, 8000.0));
+        let patches = patches(&window, corner, Cell::new(30, 18));
         assert!(patches[..4 * LOCAL_MAP_SIDE].iter().all(|&units| units == 0.0));
     }
 
     #[test]
-    fn the_terminal_is_marked_where_one_move_or_two_would_end_the_mission() {
-        let flat = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
-        let rays = Rays { heights: &flat, altitude_m: 60 };
-        let map = YieldMap::new(&rays, Cell::new(20, 15));
+    fn neighbouring_terminal_is_marked() {
+        let empty = [[0; WINDOW]; WINDOW];
         for (terminal, mark) in [
             ((20, 16), Some((4, 5))),
             ((19, 15), Some((3, 4))),
             ((21, 14), Some((5, 3))),
-            // Above it: it is entered by a move, not by a stay.
+            // On the terminal: only a move enters it.
             ((20, 15), None),
             ((22, 15), None),
             ((20, 13), None),
             ((i16::MAX, i16::MIN), None),
         ] {
-            let patches = map.patches(Cell::new(terminal.0, terminal.1));
+            let patches = patches(&empty, Cell::new(20, 15), Cell::new(terminal.0, terminal.1));
             let mut expected = [0.0; LOCAL_MAP_CELLS];
             if let Some((column, row)) = mark {
                 expected[row * LOCAL_MAP_SIDE + column] = TERMINAL_UNITS;

@@ -193,7 +193,7 @@ fn another_contract_is_refused_with_a_line_that_says_so() {
              gleaner version that trained it"
         )
     );
-    assert!(line("k_max", "6").starts_with("the model sees 6 devices, this program shows it 12"));
+    assert!(line("k_max", "6").starts_with("the model takes 6 devices, this program provides 12"));
     assert!(line("action_order", "hover,east").starts_with("the model's actions are `hover,east`"));
     assert!(line("steps", "many").starts_with("metadata entry `steps` of the model: `many`: "));
     assert!(line("golden", "[{}]").starts_with("metadata entry `golden` of the model: "));
@@ -239,7 +239,7 @@ fn another_interface_is_refused_with_a_line_that_says_so() {
     starts(|graph| graph.node[2].output[0] = "x".into(), "no node computes the output `logits`");
     starts(
         |graph| graph.initializer[2].data_location = Some(DataLocation::External as i32),
-        "the weight `weight` lies in another file",
+        "the weight `weight` is in another file",
     );
     starts(|graph| graph.node[2].op_type = "Magic".into(), "tract cannot run the model (");
     starts(|graph| graph.node[2].input[0] = "nowhere".into(), "tract cannot run the model (");

@@ -1,9 +1,11 @@
 //! The text that names a port.
 
-use crate::suggestion::suggest;
+mod suggestion;
+
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
+use suggestion::suggest;
 
 /// Baud rate of a serial endpoint that names none: the default of the first telemetry port of ArduPilot
 /// (`SERIAL1_BAUD` 57) and PX4 (`SER_TEL1_BAUD` 57600).

@@ -35,7 +35,6 @@ mod resolver;
 mod retry;
 mod serial;
 mod signals;
-mod suggestion;
 mod tcp;
 mod transport;
 mod udp;

@@ -1,9 +1,9 @@
-//! What the aircraft may do in one slot, and sets of it.
+//! Actions of one slot, and sets of actions.
 
 use crate::BatteryUnits;
 use serde::{Deserialize, Serialize};
 
-/// One decision (paper, eq. 2). The discriminants are the model's output order and the order on every wire.
+/// One decision (paper, eq. 2). The discriminants are the order of the model's outputs and of every wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum Action {
@@ -20,9 +20,9 @@ pub enum Action {
 }
 
 impl Action {
-    /// How many there are.
+    /// Number of actions.
     pub const COUNT: usize = 5;
-    /// All of them, in contract order.
+    /// All actions, in contract order.
     pub const ALL: [Action; Action::COUNT] =
         [Action::Hover, Action::North, Action::West, Action::South, Action::East];
     /// The four moves, in contract order.
@@ -59,7 +59,7 @@ impl Action {
         }
     }
 
-    /// What it takes from the battery (paper, eq. 4): half a unit to hover, one to move.
+    /// Energy (paper, eq. 4): half a unit to hover, one unit to move.
     #[must_use]
     pub const fn cost(self) -> BatteryUnits {
         match self {
@@ -68,7 +68,7 @@ impl Action {
         }
     }
 
-    /// Lower-case English name, as logs and reports print it.
+    /// Lower-case name in logs and reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -88,10 +88,10 @@ pub struct ActionMask(u8);
 impl ActionMask {
     /// No action.
     pub const EMPTY: ActionMask = ActionMask(0);
-    /// All five.
+    /// All actions.
     pub const FULL: ActionMask = ActionMask(0b1_1111);
 
-    /// The set with these bits; bits above the fifth are dropped.
+    /// The set with these bits. Bits above the fifth are ignored.
     #[must_use]
     pub const fn from_bits(bits: u8) -> ActionMask {
         ActionMask(bits & 0b1_1111)
@@ -115,13 +115,13 @@ impl ActionMask {
         self.0 & (1 << action.index()) != 0
     }
 
-    /// How many actions are in the set.
+    /// Number of actions in the set.
     #[must_use]
     pub const fn len(self) -> usize {
         self.0.count_ones() as usize
     }
 
-    /// Whether nothing is allowed.
+    /// Whether the set is empty.
     #[must_use]
     pub const fn is_empty(self) -> bool {
         self.0 == 0
@@ -132,8 +132,8 @@ impl ActionMask {
         Action::ALL.into_iter().filter(move |&action| self.allows(action))
     }
 
-    /// The member with the highest logit; the first one on a tie, `None` when the set is empty or a
-    /// member's logit is NaN. This one function decides in the trainer, in the simulator and on board.
+    /// The member with the highest logit, the first of equal ones. `None` if the set is empty or a member's logit is NaN.
+    /// Trainer, simulator and aircraft all decide with this function.
     #[must_use]
     pub fn argmax(self, logits: &[f32; Action::COUNT]) -> Option<Action> {
         let mut best: Option<(Action, f32)> = None;

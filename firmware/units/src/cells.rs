@@ -1,4 +1,4 @@
-//! A set of cells in a quarter of a kilobyte: the fence.
+//! Sets of cells, 256 bytes each. The fence is one.
 
 use crate::{Cell, Grid, MAX_CELLS};
 
@@ -12,13 +12,13 @@ pub struct CellSet {
 }
 
 impl CellSet {
-    /// No cell of `grid`.
+    /// The empty set in `grid`.
     #[must_use]
     pub const fn empty(grid: Grid) -> CellSet {
         CellSet { grid, words: [0; WORDS] }
     }
 
-    /// Every cell of `grid`.
+    /// All cells of `grid`.
     #[must_use]
     pub fn full(grid: Grid) -> CellSet {
         let mut set = CellSet::empty(grid);
@@ -28,13 +28,13 @@ impl CellSet {
         set
     }
 
-    /// The grid whose cells these are.
+    /// The grid of the cells.
     #[must_use]
     pub const fn grid(&self) -> Grid {
         self.grid
     }
 
-    /// Adds a cell; a cell outside the grid changes nothing.
+    /// Adds a cell; no effect for a cell outside the grid.
     pub fn insert(&mut self, cell: Cell) {
         if let Some((word, bit)) = self.place(cell)
             && let Some(word) = self.words.get_mut(word)
@@ -43,7 +43,7 @@ impl CellSet {
         }
     }
 
-    /// Takes a cell out.
+    /// Removes a cell.
     pub fn remove(&mut self, cell: Cell) {
         if let Some((word, bit)) = self.place(cell)
             && let Some(word) = self.words.get_mut(word)
@@ -52,19 +52,19 @@ impl CellSet {
         }
     }
 
-    /// Whether the cell is in the set; never for a cell outside the grid.
+    /// Whether the cell is in the set; `false` for a cell outside the grid.
     #[must_use]
     pub fn contains(&self, cell: Cell) -> bool {
         self.place(cell).is_some_and(|(word, bit)| self.words.get(word).is_some_and(|w| w & bit != 0))
     }
 
-    /// How many cells are in the set.
+    /// Number of cells in the set.
     #[must_use]
     pub fn len(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// Whether no cell is in the set.
+    /// Whether the set is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.words.iter().all(|&word| word == 0)
@@ -90,7 +90,7 @@ mod tests {
     use crate::Metres;
 
     #[test]
-    fn a_set_holds_what_was_put_in_and_nothing_outside_the_grid() {
+    fn sets_hold_cells_of_their_grid_only() {
         let grid = Grid::new(7, 5, Metres(20.0)).unwrap();
         let mut set = CellSet::full(grid);
         assert_eq!(set.len(), 35);

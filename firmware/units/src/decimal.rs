@@ -1,12 +1,12 @@
-//! Numbers in sentences, without the formatting of `core`.
+//! Formatting of numbers without `core`'s float formatting.
 
 use core::fmt;
 
-/// A number in plain decimal notation with up to three decimal places, rounded half to even as `core` does; with `{:#}` a
-/// fraction of zero is left out. What is no number, or beyond a thousand million, is a dash.
+/// A number in decimal notation with up to three places, rounded half to even like `core`. `{:#}` omits a zero fraction.
+/// NaN, infinity and numbers beyond 1e12 / 10^`PLACES` are printed as a dash.
 ///
-/// The formatting of floats in `core` is exact for every number there is, takes 10 KB of flash, and can panic as far
-/// as a linker can tell; the sentences of the aircraft need neither.
+/// `core`'s float formatting takes 10 KB of flash and leaves panic paths in the image. Messages of the aircraft do not need
+/// its precision.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decimal<const PLACES: usize>(pub f32);
 
@@ -37,7 +37,7 @@ mod tests {
     use std::{format, string::ToString};
 
     #[test]
-    fn it_is_what_core_writes() {
+    fn output_equals_that_of_core() {
         for step in -2000..2000 {
             let number = step as f32 * 0.037;
             assert_eq!(Decimal::<1>(number).to_string(), format!("{number:.1}").replace("-0.0", "0.0"));
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_needed_is_left_out_and_what_is_no_number_is_a_dash() {
+    fn zero_fractions_are_omitted_and_nan_is_a_dash() {
         assert_eq!(format!("{:#}..{:#}", Decimal::<1>(0.5), Decimal::<1>(10.0)), "0.5..10");
         assert_eq!(Decimal::<2>(f32::NAN).to_string(), "-");
         assert_eq!(Decimal::<2>(f32::INFINITY).to_string(), "-");

@@ -4,7 +4,7 @@ use crate::{Action, Metres};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// The most cells any grid may have: the capacity of every on-board table of cells.
+/// Most cells of a grid: the capacity of every table of cells on board.
 pub const MAX_CELLS: usize = 2048;
 
 /// One cell: x counts east, y counts north, `(0, 0)` is the south-west corner of the grid.
@@ -23,14 +23,14 @@ impl Cell {
         Cell { x, y }
     }
 
-    /// Where `action` leads, whether or not that is inside a grid.
+    /// The cell after `action`, which may be outside the grid.
     #[must_use]
     pub const fn after(self, action: Action) -> Cell {
         let (east, north) = action.offset();
         Cell { x: self.x.saturating_add(east), y: self.y.saturating_add(north) }
     }
 
-    /// Moves between the two on an open grid: |dx| + |dy|.
+    /// Moves between two cells without a fence: |dx| + |dy|.
     #[must_use]
     pub const fn manhattan(self, other: Cell) -> u32 {
         self.x.abs_diff(other.x) as u32 + self.y.abs_diff(other.y) as u32
@@ -51,7 +51,7 @@ pub struct Grid {
     cell_m: f32,
 }
 
-/// Why a grid cannot be.
+/// Why a grid is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridError {
     /// A side of zero cells.
@@ -75,7 +75,7 @@ impl fmt::Display for GridError {
 impl core::error::Error for GridError {}
 
 impl Grid {
-    /// One cell of 20 m: the smallest grid, for whoever has none yet.
+    /// One cell of 20 m: a placeholder until a mission is loaded.
     pub const ONE_CELL: Grid = Grid { width: 1, height: 1, cell_m: 20.0 };
 
     /// `width` x `height` cells of `cell` metres a side.
@@ -113,19 +113,19 @@ impl Grid {
         Metres(self.cell_m)
     }
 
-    /// How many cells: at most [`MAX_CELLS`].
+    /// Number of cells, at most [`MAX_CELLS`].
     #[must_use]
     pub const fn len(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// Never: a grid has at least one cell.
+    /// Always `false`: a grid has at least one cell.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         false
     }
 
-    /// Whether the cell lies inside.
+    /// Whether the cell is inside.
     #[must_use]
     pub const fn contains(&self, cell: Cell) -> bool {
         cell.x >= 0 && cell.y >= 0 && (cell.x as u16) < self.width && (cell.y as u16) < self.height
@@ -141,14 +141,14 @@ impl Grid {
     #[must_use]
     pub const fn cell_at(&self, index: usize) -> Option<Cell> {
         let width = self.width as usize;
-        // No side is zero; checked all the same, so that no panic is left for the linker to find.
+        // The width is never zero. The checked operations leave no panic path in the board's image.
         match (index.checked_rem(width), index.checked_div(width)) {
             (Some(x), Some(y)) if index < self.len() => Some(Cell { x: x as i16, y: y as i16 }),
             _ => None,
         }
     }
 
-    /// Where `action` leads from `cell`; `None` if that leaves the grid.
+    /// The cell after `action`; `None` outside the grid.
     #[must_use]
     pub const fn step(&self, cell: Cell, action: Action) -> Option<Cell> {
         let next = cell.after(action);
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn index_and_cell_are_inverse_and_steps_stay_inside() {
+    fn indices_and_steps_stay_inside_the_grid() {
         let grid = Grid::new(40, 30, Metres(20.0)).unwrap();
         for (index, cell) in grid.cells().enumerate() {
             assert_eq!(grid.index(cell), Some(index));
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_grids_are_refused() {
+    fn invalid_grids_are_refused() {
         assert_eq!(Grid::new(0, 3, Metres(20.0)), Err(GridError::Empty));
         assert_eq!(Grid::new(2000, 3, Metres(20.0)), Err(GridError::TooManyCells));
         assert_eq!(Grid::new(3, 3, Metres(f32::NAN)), Err(GridError::CellSize));

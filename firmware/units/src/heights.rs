@@ -1,34 +1,34 @@
-//! Building heights per cell, and the CSV that carries them.
+//! Building heights of the cells, and their CSV format.
 
 use crate::{Cell, Grid, GridError, MAX_CELLS, Metres};
 use core::fmt;
 
-/// Building heights of a grid in whole metres; 0 is open ground. Two kilobytes.
+/// Building heights of a grid in whole metres, 0 for open ground. Two kilobytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightMap {
     grid: Grid,
     heights_m: [u8; MAX_CELLS],
 }
 
-/// What is wrong with a city file, and where: line and column count from 1, columns in values.
+/// A fault in a city file. Line and column count from 1; a column is a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CsvError {
     /// Line of the text.
     pub line: usize,
-    /// Value within the line.
+    /// Value in the line.
     pub column: usize,
     /// The fault.
     pub fault: CsvFault,
 }
 
-/// The kinds of fault in a city file.
+/// Faults of a city file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CsvFault {
     /// Not a whole number of metres from 0 to 255.
     Height,
-    /// This row has another number of values than the first.
+    /// The row has another number of values than the first.
     RowLength,
-    /// The size is impossible.
+    /// The grid is invalid.
     Grid(GridError),
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for CsvError {
 impl core::error::Error for CsvError {}
 
 impl HeightMap {
-    /// A flat city.
+    /// A city without buildings.
     #[must_use]
     pub const fn flat(grid: Grid) -> HeightMap {
         HeightMap { grid, heights_m: [0; MAX_CELLS] }
@@ -56,7 +56,7 @@ impl HeightMap {
     /// east, separated by commas. Empty lines and lines that begin with `#` are skipped.
     ///
     /// # Errors
-    /// The first fault with its place, see [`CsvError`].
+    /// The first fault, see [`CsvError`].
     pub fn from_csv(text: &str, cell: Metres) -> Result<HeightMap, CsvError> {
         let rows = || {
             text.lines()
@@ -103,13 +103,13 @@ impl HeightMap {
         self.height_m(cell).map(|height_m| Metres(f32::from(height_m)))
     }
 
-    /// [`HeightMap::height`] as the whole metres that are stored.
+    /// [`HeightMap::height`] in whole metres.
     #[must_use]
     pub fn height_m(&self, cell: Cell) -> Option<u8> {
         self.grid.index(cell).and_then(|index| self.heights_m.get(index)).copied()
     }
 
-    /// Sets one cell's height in whole metres; a cell outside the grid changes nothing.
+    /// Sets the height of a cell in whole metres; no effect outside the grid.
     pub fn set(&mut self, cell: Cell, height_m: u8) {
         if let Some(slot) = self.grid.index(cell).and_then(|index| self.heights_m.get_mut(index)) {
             *slot = height_m;
@@ -122,7 +122,7 @@ impl HeightMap {
         self.heights_m.get(..self.grid.len()).unwrap_or(&[])
     }
 
-    /// The tallest building.
+    /// Height of the tallest building.
     #[must_use]
     pub fn tallest(&self) -> Metres {
         Metres(f32::from(self.as_slice().iter().copied().max().unwrap_or(0)))
@@ -134,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_row_of_the_file_is_the_northernmost() {
+    fn first_row_of_the_file_is_the_northernmost() {
         let map = HeightMap::from_csv("# city\n1,2,3\n\n4,5,6\n", Metres(20.0)).unwrap();
         assert_eq!(map.as_slice(), [4, 5, 6, 1, 2, 3]);
         assert_eq!(map.height(Cell::new(2, 1)), Some(Metres(3.0)));
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_name_their_place() {
+    fn errors_contain_line_and_column() {
         let fault = |text: &str| HeightMap::from_csv(text, Metres(20.0)).unwrap_err();
         assert_eq!(fault("1,2\n3,x\n"), CsvError { line: 2, column: 2, fault: CsvFault::Height });
         assert_eq!(fault("1,2\n3\n"), CsvError { line: 2, column: 1, fault: CsvFault::RowLength });

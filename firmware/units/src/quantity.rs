@@ -1,4 +1,4 @@
-//! Quantities as types. A raw number elsewhere keeps its unit in its name.
+//! Quantities as types. Elsewhere, the name of a raw number ends with its unit.
 
 use core::ops::{Add, Mul, Neg, Sub};
 use serde::{Deserialize, Serialize};
@@ -47,6 +47,10 @@ quantity!(
     Metres
 );
 quantity!(
+    /// An angle in degrees. Headings count clockwise from true north.
+    Degrees
+);
+quantity!(
     /// A speed.
     MetresPerSecond
 );
@@ -55,13 +59,21 @@ quantity!(
     Db
 );
 quantity!(
-    /// A power level relative to one milliwatt. The difference of two levels is a ratio; their sum is nothing.
+    /// A power level relative to one milliwatt. The difference of two levels is a ratio; they have no sum.
     Dbm
 );
 quantity!(
     /// Energy, in units of one move by one cell.
     BatteryUnits
 );
+
+impl Degrees {
+    /// The angle in radians.
+    #[must_use]
+    pub fn to_radians(self) -> f32 {
+        self.0.to_radians()
+    }
+}
 
 additive!(Metres);
 additive!(MetresPerSecond);
@@ -91,7 +103,7 @@ impl Sub for Dbm {
 
 /// ```compile_fail
 /// use gleaner_units::Dbm;
-/// let _ = Dbm(36.0) + Dbm(1.0); // two levels have no sum
+/// let _ = Dbm(36.0) + Dbm(1.0); // levels have no sum
 /// ```
 #[allow(dead_code)]
 struct LevelsDoNotAdd;
@@ -101,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_link_budget_reads_like_one() {
+    fn link_budget_adds_up() {
         let received = Dbm(36.0) + Db(-96.0);
         let noise = Dbm(-60.0);
         let snr: Db = received - noise;

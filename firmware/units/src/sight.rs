@@ -1,20 +1,20 @@
-//! Line of sight from the ground to flight altitude, decided in whole numbers.
+//! Line of sight between ground and flight altitude, in integer arithmetic.
 
 use crate::{Cell, Grid, HeightMap, Metres};
 
-/// Who on the ground sees whom in the air.
+/// Line of sight in one city at one altitude.
 pub trait Sight {
-    /// The cells that it knows of.
+    /// The city's grid.
     fn grid(&self) -> Grid;
 
-    /// How high above the ground they fly.
+    /// Flight altitude above the ground.
     fn altitude(&self) -> Metres;
 
-    /// Whether a device on the ground at the centre of `ground` and an aircraft at the centre of `air` see each other.
+    /// Whether there is line of sight between a device at the centre of `ground` and an aircraft above the centre of `air`.
     fn sees(&self, ground: Cell, air: Cell) -> bool;
 }
 
-/// Line of sight worked out ray by ray, where there is no memory for a table.
+/// Line of sight computed for each query, where memory for a table is missing.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<'a> {
     /// The buildings.
@@ -40,20 +40,18 @@ impl Sight for Rays<'_> {
 /// Whether the straight line from the centre of `device` on the ground to the centre of `uav` at `altitude_m`
 /// passes over the buildings (paper, section II-B: the link condition z).
 ///
-/// Walks the cells that the line crosses, in order (Amanatides and Woo). The line rises all the way, so it is
-/// lowest over a cell where it enters it: at the fraction t of its length it is `t * altitude_m` high, and a
-/// building taller than that blocks it. Buildings are closed: a line through the exact corner of four cells
-/// touches the two beside its way, and they block it too. Touching a roof does not. All fractions are
-/// compared as products of whole numbers, so the answer is exact, the same everywhere and in every mirror
-/// image of the city.
+/// Visits the cells that the line crosses, in order (Amanatides and Woo 1987). The line rises from the device, so it is
+/// lowest over a cell where it enters it: at the fraction t of its length its height is `t * altitude_m`, and a taller
+/// building blocks it. A line through the corner of four cells is also blocked by the two cells beside it. Touching a roof
+/// does not block. Fractions are compared as products of integers, so the result is exact, identical on every machine, and
+/// symmetric under mirroring of the city.
 fn ray_is_clear(heights: &HeightMap, altitude_m: u16, device: Cell, uav: Cell) -> bool {
     let (width, height) = (i32::from(uav.x.abs_diff(device.x)), i32::from(uav.y.abs_diff(device.y)));
     let (step_x, step_y) = ((uav.x - device.x).signum(), (uav.y - device.y).signum());
     let mut cell = device;
     let (mut crossed_x, mut crossed_y) = (0, 0);
     while crossed_x < width || crossed_y < height {
-        // The next border eastwards or westwards lies at t = next_x / (2 width), northwards or southwards
-        // at t = next_y / (2 height).
+        // The next border along x is at t = next_x / (2 width), along y at t = next_y / (2 height).
         let (next_x, next_y) = (2 * crossed_x + 1, 2 * crossed_y + 1);
         let order = (next_x * height).cmp(&(next_y * width));
         let (numerator, denominator) = if order.is_gt() { (next_y, 2 * height) } else { (next_x, 2 * width) };
@@ -90,11 +88,11 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_blocks_exactly_when_it_is_taller_than_the_line_where_it_enters() {
+    fn walls_block_if_taller_than_the_line_at_entry() {
         // From x = 0 to x = 2 the line enters cell 1 at a quarter of its length: 15 m high.
         let wall = |height_m: u8| city(&format!("0,{height_m},0\n"));
         let clear = |map: &HeightMap| ray_is_clear(map, 60, Cell::new(0, 0), Cell::new(2, 0));
-        assert!(clear(&wall(15)), "touching is clear");
+        assert!(clear(&wall(15)), "touching does not block");
         assert!(!clear(&wall(16)));
         // Towards x = 1 itself the line enters it at half of its length: 30 m high.
         let near = |map: &HeightMap| ray_is_clear(map, 60, Cell::new(0, 0), Cell::new(1, 0));
@@ -102,17 +100,17 @@ mod tests {
     }
 
     #[test]
-    fn a_diagonal_is_blocked_by_each_corner_it_touches() {
+    fn diagonals_are_blocked_by_cells_at_their_corners() {
         // The corner lies at half of the line: 30 m high. The first row of the text is the northern one.
         let diagonal = |text: &str| ray_is_clear(&city(text), 60, Cell::new(0, 0), Cell::new(1, 1));
-        assert!(diagonal("30,30\n0,30\n"), "touching a roof is clear");
+        assert!(diagonal("30,30\n0,30\n"), "touching a roof does not block");
         assert!(!diagonal("31,0\n0,0\n"), "the north-western corner");
         assert!(!diagonal("0,0\n0,31\n"), "the south-eastern corner");
         assert!(!diagonal("0,31\n0,0\n"), "the cell beyond");
     }
 
     #[test]
-    fn straight_up_is_always_clear_even_from_between_towers() {
+    fn straight_up_is_always_clear() {
         let heights = city("50,50,50\n50,0,50\n50,50,50\n");
         let rays = Rays { heights: &heights, altitude_m: 60 };
         let seen = rays.grid().cells().filter(|&air| rays.sees(Cell::new(1, 1), air));

@@ -1,9 +1,9 @@
-//! Time as an argument. Nobody below the programs reads a clock.
+//! Time as an argument. Only programs read a clock.
 
 use core::ops::{Add, Sub};
 use serde::{Deserialize, Serialize};
 
-/// A point in time: microseconds since the owner of the clock started it.
+/// A point in time: microseconds since the start of the caller's clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Instant {
     micros: u64,
@@ -43,7 +43,7 @@ impl Instant {
         (self.micros / 1_000) as u32
     }
 
-    /// The time from `earlier` to here; zero if `earlier` is later.
+    /// The time since `earlier`; zero if `earlier` is later.
     #[must_use]
     pub const fn since(self, earlier: Instant) -> Duration {
         Duration { micros: self.micros.saturating_sub(earlier.micros) }
@@ -64,14 +64,14 @@ impl Sub for Instant {
     }
 }
 
-/// A span of time, never negative.
+/// A time span, never negative.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Duration {
     micros: u64,
 }
 
 impl Duration {
-    /// Nothing.
+    /// No time.
     pub const ZERO: Duration = Duration { micros: 0 };
 
     /// `micros` microseconds.
@@ -92,7 +92,7 @@ impl Duration {
         Duration { micros: secs.saturating_mul(1_000_000) }
     }
 
-    /// `secs` seconds; negative and NaN give zero, too long gives the longest span.
+    /// `secs` seconds. Negative and NaN give zero; too large a number gives the longest span.
     #[must_use]
     pub fn from_secs_f32(secs: f32) -> Duration {
         Duration { micros: (f64::from(secs) * 1e6) as u64 }
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_never_wraps_or_goes_negative() {
+    fn time_saturates() {
         let early = Instant::from_millis(5);
         let late = early + Duration::from_secs(2);
         assert_eq!(late - early, Duration::from_millis(2_000));

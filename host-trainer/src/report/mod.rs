@@ -2,11 +2,13 @@
 //!
 //! Measuring is not done here; [`Report`] holds what was measured, and everything here is a pure function of it.
 
+mod attention;
 mod chart;
 mod csv;
 mod drawing;
 mod figure;
 mod page;
+mod section;
 mod table;
 
 pub use csv::files;

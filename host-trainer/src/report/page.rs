@@ -1,8 +1,9 @@
 //! The page: one HTML file that needs nothing else, readable on a desk, on a phone and on paper.
 
+use super::attention::attention_section;
+use super::section::section;
 use super::table::{Metric, main_table, metric_table};
 use super::{Detail, Report, figure};
-use crate::judge::explanation::KINDS;
 use crate::judge::paper::{CITATIONS, EXAMPLES, Setting};
 use gleaner_world::ScenarioKind;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -105,10 +106,6 @@ fn tiles(report: &Report) -> Markup {
 fn points(change: f32) -> String {
     let sign = if change < 0.0 { "" } else { "+" };
     format!("{sign}{} points", super::chart::grouped(&format!("{change:.2}")))
-}
-
-fn section(id: &str, title: &str, body: Markup) -> Markup {
-    html! { section id=(id) { h2 { (title) } (body) } }
 }
 
 fn main_section(report: &Report) -> Markup {
@@ -333,61 +330,6 @@ fn generalization_section(report: &Report) -> Markup {
             @for metric in Metric::ALL { (metric_table(report, metric)) }
         },
     )
-}
-
-fn attention_section(detail: &Detail) -> Markup {
-    section(
-        "attention",
-        "Attention (figure 7)",
-        html! {
-            @if detail.gazes.is_empty() {
-                p { (detail.system) " has no attention." }
-            } @else {
-                figure {
-                    div.panels {
-                        @for gaze in &detail.gazes {
-                            div.panel {
-                                h3 { "First slot, w = (" (gaze.w_data) ", " (1.0 - gaze.w_data) ")" }
-                                (figure::attention(gaze))
-                            }
-                        }
-                        div.panel {
-                            h3 { "Along the whole mission" }
-                            (figure::shares_legend(detail))
-                            (figure::shares(detail))
-                        }
-                    }
-                    figcaption {
-                        b { "Figure 7. " } "Second attention layer of " (detail.system) ", mean over the heads, RD, K = 6. "
-                        "Matrices: the first slot of evaluation realization " (detail.example) ", darker for more; the grey "
-                        "part belongs to the six absent devices. Right: the column sums, by kind of token, as a share of all "
-                        "attention, averaged over the slots of each mission and then over all realizations. The paper finds "
-                        "that w = (1, 0) attends to the devices and w = (0, 1) almost entirely to the preference. From "
-                        code { "attention_initial.csv" } " and " code { "attention.csv" } "."
-                    }
-                }
-                (shares_table(detail))
-            }
-        },
-    )
-}
-
-fn shares_table(detail: &Detail) -> Markup {
-    html! {
-        figure { div.scroll { table {
-            thead { tr { th scope="col" { "preference" } @for kind in KINDS { th scope="col" { (kind) span.unit { "%" } } } } }
-            tbody {
-                @for gaze in &detail.gazes {
-                    tr {
-                        th scope="row" { "w = (" (gaze.w_data) ", " (1.0 - gaze.w_data) ")" }
-                        @for share in gaze.along { td { (format!("{:.1}", 100.0 * share)) } }
-                    }
-                }
-            }
-        } }
-            figcaption { "Share of all attention that each kind of token receives. From " code { "attention.csv" } "." }
-        }
-    }
 }
 
 fn published_section() -> Markup {

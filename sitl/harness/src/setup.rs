@@ -3,7 +3,9 @@
 use crate::autopilot::{AircraftSettings, AutopilotKind, EnergyModel, Pack};
 use crate::modem::device_id;
 use gleaner_pilot::{DeviceSite, MAX_DEVICES, Mission, MissionError};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, GridFrame, Metres, MetresPerSecond, Ned};
+use gleaner_units::{
+    BatteryUnits, Cell, CellSet, Degrees, GeoPoint, GridFrame, GridPose, Metres, MetresPerSecond, Ned,
+};
 use gleaner_world::{
     Channel, City, CityError, Placement, Realization, Scenario, ScenarioError, ScenarioKind, Seed, World,
 };
@@ -19,7 +21,7 @@ const STAND: Ned = Ned { north_m: 12.0, east_m: -7.0, down_m: 0.5 };
 const CRUISE: MetresPerSecond = MetresPerSecond(10.0);
 /// The highest `GLN_SPEED`, for a sped-up aircraft: a slot of hovering then lasts a second.
 const TOP_SPEED: MetresPerSecond = MetresPerSecond(20.0);
-/// FlightRun altitude: the world's channel is computed for it.
+/// Flight altitude: the world's channel is computed for it.
 const ALTITUDE_M: f32 = gleaner_world::City::ALTITUDE_M as f32;
 
 /// Parameters of one simulated mission.
@@ -44,6 +46,8 @@ pub struct MissionPlan {
     pub autopilot: AutopilotKind,
     /// How much power flying takes.
     pub energy: EnergyModel,
+    /// Rotation of a drawn city's grid, clockwise from true north.
+    pub rotation: Degrees,
 }
 
 impl MissionPlan {
@@ -61,6 +65,7 @@ impl MissionPlan {
             speedup: 1.0,
             autopilot: AutopilotKind::ArduPilot,
             energy: EnergyModel::Nominal,
+            rotation: Degrees(0.0),
         }
     }
 }
@@ -120,7 +125,8 @@ impl MissionSetup {
             return Err(PlanError::TooManyDevices);
         }
         let realization = Realization::draw(world.city(), &scenario, Seed::evaluation(plan.seed))?;
-        let mission = drawn_mission(&world, &realization)?;
+        let pose = GridPose { corner: CORNER, rotation: plan.rotation };
+        let mission = drawn_mission(&world, &realization, pose)?;
         MissionSetup::assemble(world, plan, realization, mission)
     }
 
@@ -171,16 +177,16 @@ impl MissionSetup {
         }
         let grid = mission.grid();
         // The origin lies so that the stand is the centre of the start cell.
-        let at_corner = GridFrame::new(grid, mission.corner, mission.corner);
+        let at_corner = GridFrame::new(grid, mission.pose, mission.pose.corner);
         let start = at_corner.centre(realization.start(), 0.0);
         let (north_m, east_m) = (start.north_m - STAND.north_m, start.east_m - STAND.east_m);
-        let origin = mission.corner.offset_by(Metres(north_m), Metres(east_m));
+        let origin = mission.pose.corner.offset_by(Metres(north_m), Metres(east_m));
         let mut pack = Pack::new(capacity, plan.energy);
         // A slot of hovering is a time on the pilot's clock: its price must not grow with the speed-up.
         pack.hover_per_s /= plan.speedup;
         let (wander_m, seed) = (plan.wander_m, plan.seed);
         let aircraft = AircraftSettings { system_id: 1, origin, stand: STAND, pack, wander_m, seed };
-        let frame = GridFrame::new(grid, mission.corner, origin);
+        let frame = GridFrame::new(grid, mission.pose, origin);
         Ok(MissionSetup { plan, world, realization, mission, aircraft, frame })
     }
 
@@ -201,7 +207,7 @@ impl MissionSetup {
         ]
     }
 
-    /// FlightRun altitude above the take-off point, m.
+    /// Flight altitude above the take-off point, m.
     #[must_use]
     pub const fn altitude_m(&self) -> f32 {
         ALTITUDE_M
@@ -214,7 +220,7 @@ impl MissionSetup {
     }
 }
 
-fn drawn_mission(world: &World, realization: &Realization) -> Result<Mission, MissionError> {
+fn drawn_mission(world: &World, realization: &Realization, pose: GridPose) -> Result<Mission, MissionError> {
     let sites = realization.devices().iter().enumerate().map(|(index, placement)| DeviceSite {
         id: device_id(index),
         cell: placement.cell,
@@ -223,7 +229,7 @@ fn drawn_mission(world: &World, realization: &Realization) -> Result<Mission, Mi
     let mission = Mission {
         heights: world.city().heights().clone(),
         fence: CellSet::full(world.city().grid()),
-        corner: CORNER,
+        pose,
         terminal: realization.terminal(),
         budget: realization.battery(),
         devices: sites.collect(),

@@ -1,11 +1,13 @@
 //! The configuration file and its faults.
 
-use super::{ConfigError, SigningConfig};
+use super::{ConfigError, RadioFormat, SigningConfig};
 use crate::logs::Limits;
-use gleaner_link::Parameters;
+use gleaner_link::{Operators, Parameters};
 use gleaner_pilot::Settings;
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
+use gleaner_radio::Calibration;
+use gleaner_units::Db;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,6 +24,9 @@ pub(super) struct File {
     #[serde(default)]
     pub ground: Vec<Spanned<String>>,
     pub radio: Option<Spanned<String>>,
+    radio_format: Option<Spanned<String>>,
+    radio_snr: Option<SnrTable>,
+    operators: Option<Vec<Spanned<String>>>,
     pub log_dir: Option<PathBuf>,
     pub state_dir: Option<PathBuf>,
     component_id: Option<Spanned<i64>>,
@@ -45,6 +50,14 @@ impl Default for LogTable {
     fn default() -> LogTable {
         LogTable { telemetry: true, file_mb: None, min_free_mb: None }
     }
+}
+
+/// `offset_db + slope * measured`, in place of the format's own calibration.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SnrTable {
+    offset_db: f32,
+    slope: f32,
 }
 
 #[derive(Deserialize)]
@@ -96,7 +109,40 @@ impl Source<'_> {
                 self.number("system_id", system_id, 1..=254, "or leave it out to adopt the autopilot's")?;
             settings.system_id = Some(id);
         }
+        if let Some(operators) = &file.operators {
+            settings.operators = self.operators(operators)?;
+        }
         Ok(settings)
+    }
+
+    fn operators(&self, entries: &[Spanned<String>]) -> Result<Operators, ConfigError> {
+        let mut operators = Operators::none();
+        for entry in entries {
+            let at = entry.span().start;
+            let operator = entry
+                .get_ref()
+                .parse()
+                .map_err(|error| self.fault(at, format!("operators: {:?}: {error}", entry.get_ref())))?;
+            if !operators.add(operator) {
+                return Err(self.fault(at, format!("operators: more than {} entries", Operators::MAX)));
+            }
+        }
+        Ok(operators)
+    }
+
+    pub fn radio_format(&self, file: &File) -> Result<RadioFormat, ConfigError> {
+        let calibration =
+            file.radio_snr.as_ref().map(|snr| Calibration { offset: Db(snr.offset_db), slope: snr.slope });
+        let Some(name) = &file.radio_format else { return Ok(RadioFormat::Cobs) };
+        match name.get_ref().as_str() {
+            "cobs" => Ok(RadioFormat::Cobs),
+            "json_lines" => Ok(RadioFormat::JsonLines(calibration.unwrap_or_default())),
+            "semtech_udp" => Ok(RadioFormat::SemtechUdp(calibration.unwrap_or(Calibration::LORA))),
+            other => Err(self.fault(
+                name.span().start,
+                format!("radio_format = {other:?}: there are cobs, json_lines and semtech_udp"),
+            )),
+        }
     }
 
     pub fn signing(&self, file: &File, folder: &Path) -> Result<Option<SigningConfig>, ConfigError> {

@@ -2,11 +2,13 @@
 //!
 //! ```toml
 //! model = "policy.onnx"                       # optional; paths are relative to this file
-//! engine = "tract"                            # optional: tract or native
+//! engine = "native"                           # optional: native or tract
 //! mission = "mission.toml"
 //! autopilot = "serial:/dev/ttyAMA0:921600"
 //! ground = ["udpout:192.168.1.10:14550"]      # optional: more MAVLink ports
 //! radio = "serial:/dev/ttyUSB0:115200"        # optional: reports may also arrive by TUNNEL
+//! radio_format = "cobs"                       # or "json_lines", "semtech_udp"
+//! operators = ["255", "*/190"]                # who may command: SYSTEM, SYSTEM/COMPONENT or */COMPONENT
 //! log_dir = "log"                             # optional
 //! state_dir = "state"                         # optional
 //! component_id = 191                          # optional
@@ -35,8 +37,21 @@ use gleaner_link::Parameters;
 use gleaner_pilot::Settings;
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
+use gleaner_radio::Calibration;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
+
+/// Format of the radio's reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum RadioFormat {
+    /// Postcard in COBS.
+    #[default]
+    Cobs,
+    /// One JSON object per line or datagram.
+    JsonLines(Calibration),
+    /// The Semtech UDP packet forwarder protocol.
+    SemtechUdp(Calibration),
+}
 
 /// Everything that a run needs.
 pub struct Config {
@@ -52,6 +67,8 @@ pub struct Config {
     pub ground: Vec<Endpoint>,
     /// Port to the radio.
     pub radio: Option<Endpoint>,
+    /// Format of the radio's reports.
+    pub radio_format: RadioFormat,
     /// Folder of the logs.
     pub log_dir: Option<PathBuf>,
     /// Folder of what outlives a run.
@@ -176,6 +193,7 @@ fn merge(
             .ok_or(missing("autopilot", "serial:/dev/ttyAMA0:921600"))?,
         ground: if setup.ground.is_empty() { ground } else { setup.ground.clone() },
         radio: setup.radio.clone().or(radio),
+        radio_format: source.radio_format(&file)?,
         log_dir: path(&setup.log_dir, &file.log_dir).or_else(|| variable("LOGS_DIRECTORY")),
         state_dir: path(&setup.state_dir, &file.state_dir).or_else(|| variable("STATE_DIRECTORY")),
     })

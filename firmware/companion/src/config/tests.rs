@@ -28,20 +28,20 @@ fn fault(text: &str) -> String {
 fn paths_are_relative_to_the_file_and_flags_go_first() {
     let config = merged(&Setup::default(), TEXT).unwrap();
     assert_eq!(config.model.as_deref(), Some(Path::new("/etc/gleaner/policy.onnx")));
-    assert_eq!(config.engine, EngineKind::Tract);
+    assert_eq!(config.engine, EngineKind::Native);
     assert_eq!(config.mission, Path::new("/etc/gleaner/missions/city.toml"));
     assert_eq!(config.log_dir.as_deref(), Some(Path::new("/var/log/gleaner")));
     assert_eq!(config.settings, Settings { system_id: Some(7), component_id: 192, ..Settings::default() });
     assert_eq!(config.parameters.altitude().0, 75.5);
     let setup = Setup {
         model: Some("other.onnx".into()),
-        engine: Some(EngineKind::Native),
+        engine: Some(EngineKind::Tract),
         autopilot: Some("tcpout:127.0.0.1:5760".parse().unwrap()),
         ..Setup::default()
     };
     let config = merged(&setup, TEXT).unwrap();
     assert_eq!(config.model.as_deref(), Some(Path::new("other.onnx")));
-    assert_eq!(config.engine, EngineKind::Native);
+    assert_eq!(config.engine, EngineKind::Tract);
     assert_eq!(config.autopilot.to_string(), "tcpout:127.0.0.1:5760");
     assert_eq!(config.radio.unwrap().to_string(), "serial:/dev/ttyUSB0:115200");
 }
@@ -80,7 +80,7 @@ fn faults_name_file_line_and_key_and_say_what_to_do() {
         (
             "component_id",
             "engine = \"onnx\"\ncomponent_id",
-            "line 6: engine = \"onnx\": an engine is tract or native",
+            "line 6: engine = \"onnx\": unknown engine: choose tract or native",
         ),
         ("GLN_W_DATA = 1", "GLN_W_DATA = nan", "line 10: GLN_W_DATA = NaN: "),
         ("GLN_W_DATA = 1", "GLN_W_DATA = -1", "line 10: GLN_W_DATA = -1: "),
@@ -130,4 +130,22 @@ fn the_signing_table_is_read() {
     assert_eq!(config.signing, Some(signing));
     let error = fault(&format!("{TEXT}\n[signing]\nkey = \"k\"\nports = [\"radio\"]\n"));
     assert!(error.ends_with("line 15: signing.ports: \"radio\": a port is autopilot or ground"), "{error}");
+}
+
+#[test]
+fn operators_and_the_radio_format_are_read() {
+    // Top-level keys stand before the first table.
+    let with = |lines: &str| format!("{lines}\n{TEXT}");
+    let config =
+        merged(&Setup::default(), &with("operators = [\"250/100\"]\nradio_format = \"semtech_udp\""))
+            .unwrap();
+    assert!(config.settings.operators.allow(gleaner_link::Address::new(250, 100)));
+    assert!(!config.settings.operators.allow(gleaner_link::Address::new(255, 190)));
+    assert_eq!(config.radio_format, RadioFormat::SemtechUdp(Calibration::LORA));
+    assert!(
+        fault(&with("operators = [\"gcs\"]")).contains("line 1: operators: \"gcs\": an operator is SYSTEM")
+    );
+    assert!(
+        fault(&with("radio_format = \"nmea\"")).contains("line 1: radio_format = \"nmea\": there are cobs")
+    );
 }

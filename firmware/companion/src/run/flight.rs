@@ -4,6 +4,7 @@
 //! leave only after a poll: when this loop stops, both stop, and the autopilot's own failsafes act.
 
 use super::console::Console;
+use super::radio::RadioDecoder;
 use super::service::Service;
 use super::{Kept, Logs, unix_time_s};
 use crate::clock;
@@ -36,6 +37,7 @@ pub struct Flight {
     onboard: Onboard<Timed<Engine>>,
     links: Links,
     radio: Option<Port>,
+    radio_decoder: RadioDecoder,
     logs: Logs,
     kept: Option<Kept>,
     console: Console,
@@ -50,7 +52,7 @@ impl Flight {
     pub fn new(
         onboard: Onboard<Timed<Engine>>,
         links: Links,
-        radio: Option<Port>,
+        (radio, radio_decoder): (Option<Port>, RadioDecoder),
         logs: Logs,
         kept: Option<Kept>,
         console: Console,
@@ -62,6 +64,7 @@ impl Flight {
             onboard,
             links,
             radio,
+            radio_decoder,
             logs,
             kept,
             console,
@@ -109,7 +112,7 @@ impl Flight {
 
     /// Reads each port; whether bytes may be left.
     fn receive_turn(&mut self) -> bool {
-        let Flight { onboard, links, logs, console, radio, .. } = self;
+        let Flight { onboard, links, logs, console, radio, radio_decoder, .. } = self;
         let mut more = links.receive(Instant::now(), READS_PER_TURN, |_, packet| {
             onboard.receive_link(clock::now(), &packet.bytes);
             console.received(packet, onboard.link());
@@ -125,7 +128,7 @@ impl Flight {
                 break;
             }
             more |= read == READS_PER_TURN;
-            onboard.receive_radio(clock::now(), &buffer[..bytes]);
+            radio_decoder.receive(&buffer[..bytes], onboard, radio);
         }
         more
     }

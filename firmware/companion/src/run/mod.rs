@@ -2,6 +2,7 @@
 
 mod console;
 mod flight;
+mod radio;
 mod service;
 
 use crate::args::{self, Setup};
@@ -18,6 +19,7 @@ use gleaner_link::Parameters;
 use gleaner_pilot::Onboard;
 use gleaner_policy::Timed;
 use gleaner_ports::{Endpoint, Peers, Port};
+use radio::RadioDecoder;
 use service::Service;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
@@ -49,7 +51,15 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     for refused in service::become_real_time() {
         tracing::info!("not real time: {refused}");
     }
-    let mut flight = Flight::new(onboard, links, radio, logs, kept, console, Service::new());
+    let mut flight = Flight::new(
+        onboard,
+        links,
+        (radio, RadioDecoder::new(config.radio_format)),
+        logs,
+        kept,
+        console,
+        Service::new(),
+    );
     flight.fly(|| stop.load(Ordering::Relaxed));
     flight.end();
     Ok(ExitCode::SUCCESS)

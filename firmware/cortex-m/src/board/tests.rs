@@ -5,7 +5,7 @@ use crate::doubles::{Controller, Delay, Input, Output};
 use core::cell::Cell as StdCell;
 use gleaner_pilot::{Mission, Settings};
 use gleaner_policy::{Inference, SelfTestError, Tokens};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap, Metres};
+use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap, Metres};
 use std::thread_local;
 
 thread_local! {
@@ -48,7 +48,7 @@ fn pilot(parameters: &Parameters) -> Onboard<NoEngine> {
     let mission = Mission {
         heights: HeightMap::flat(grid),
         fence: CellSet::full(grid),
-        corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 },
+        pose: GridPose { corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 }, rotation: Degrees(0.0) },
         terminal: Cell::new(3, 1),
         budget: BatteryUnits(80.0),
         devices: heapless::Vec::new(),

@@ -5,7 +5,7 @@ use core::convert::Infallible;
 use embedded_io::ErrorType;
 use gleaner_pilot::{Decision, Mission, Parameters, Settings};
 use gleaner_policy::{Inference, SelfTestError, Tokens};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap, Metres};
+use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap, Metres};
 use std::boxed::Box;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -94,7 +94,7 @@ fn runtime() -> (Runtime<'static, NoEngine, Line, Line>, Line, Line) {
     let mission = Mission {
         heights: HeightMap::flat(grid),
         fence: CellSet::full(grid),
-        corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 },
+        pose: GridPose { corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 }, rotation: Degrees(0.0) },
         terminal: Cell::new(3, 1),
         budget: BatteryUnits(80.0),
         devices: heapless::Vec::new(),

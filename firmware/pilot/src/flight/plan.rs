@@ -52,7 +52,7 @@ pub(crate) fn check(scene: &Scene<'_>, energy: &Energy, requested_at: Instant) -
     if off_m.is_nan() || off_m > ALTITUDE_TOLERANCE_M {
         return Err(Missing::Altitude);
     }
-    let frame = GridFrame::new(scene.mission.grid(), scene.mission.corner, origin);
+    let frame = GridFrame::new(scene.mission.grid(), scene.mission.pose, origin);
     let cell = frame.cell(&position).filter(|&cell| scene.guard.distance(cell).is_some());
     let cell = cell.ok_or(Missing::InsideFence)?;
     let battery = energy.offered(scene, percent);

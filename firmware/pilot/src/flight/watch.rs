@@ -19,7 +19,8 @@ const BESIDE_M: f32 = 40.0;
 /// The watches of one flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Watch {
-    position: Option<(Instant, Ned)>,
+    /// The last position, when it was judged and when it was measured on the autopilot's clock.
+    position: Option<(Ned, Instant, Option<u32>)>,
     /// When the altitude was last right.
     level_at: Instant,
     jumped: bool,
@@ -44,10 +45,21 @@ impl Watch {
     }
 
     /// Judges a position. After a jump the leg must be laid out anew from where the aircraft is.
-    pub(crate) fn see(&mut self, now: Instant, position: &Ned, plan: &Plan, leg: &Leg) -> Finding {
-        let last = self.position.replace((now, *position));
-        let moved =
-            last.map(|(at, last)| (now.since(at).as_secs_f32(), position.horizontal_distance(&last).0));
+    pub(crate) fn see(
+        &mut self,
+        now: Instant,
+        boot_ms: Option<u32>,
+        position: &Ned,
+        plan: &Plan,
+        leg: &Leg,
+    ) -> Finding {
+        let last = self.position.replace((*position, now, boot_ms));
+        let moved = last.map(|(last, at, at_ms)| {
+            // Messages may be lost: the time between two measurements is the autopilot's to say.
+            let measured_ms = at_ms.zip(boot_ms).map(|(from_ms, to_ms)| to_ms.wrapping_sub(from_ms));
+            let secs = measured_ms.map_or(now.since(at).as_secs_f32(), |ms| ms as f32 * 1e-3);
+            (secs, position.horizontal_distance(&last).0)
+        });
         if moved.is_some_and(|(secs, metres)| metres > JUMP_M + JUMP_MPS * secs) {
             return if core::mem::replace(&mut self.jumped, true) {
                 Finding::JumpedAgain

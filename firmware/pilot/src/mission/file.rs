@@ -7,6 +7,7 @@
 //! [grid]
 //! corner_lat_deg = -35.3632621    # south-west corner of cell (0, 0)
 //! corner_lon_deg = 149.1652374
+//! rotation_deg = 0.0              # optional: direction of the grid's north axis, clockwise from true north
 //! cell_m = 20.0
 //! heights = "city.csv"            # building heights, one row a line from north to south
 //!
@@ -23,7 +24,9 @@
 use crate::{DeviceSite, Mission, MissionError};
 use gleaner_guard::GuardError;
 use gleaner_units::city_file::{CityFileError, read_city};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, GridFrame, HeightMap, Metres, Ned};
+use gleaner_units::{
+    BatteryUnits, Cell, CellSet, Degrees, GeoPoint, GridFrame, GridPose, HeightMap, Metres, Ned,
+};
 use serde::{Deserialize, Serialize};
 use std::format;
 use std::string::String;
@@ -85,6 +88,7 @@ struct File {
 struct GridTable {
     corner_lat_deg: Spanned<f64>,
     corner_lon_deg: Spanned<f64>,
+    rotation_deg: Option<Spanned<f32>>,
     cell_m: Spanned<f32>,
     heights: Spanned<String>,
 }
@@ -181,7 +185,7 @@ impl Reader<'_> {
         let mut mission = Mission {
             fence: self.fence(&heights, file.fence.as_ref())?,
             heights,
-            corner,
+            pose: GridPose { corner, rotation: self.rotation(&file.grid)? },
             terminal: cell(*file.terminal.get_ref()),
             budget: BatteryUnits(*file.battery_units.get_ref()),
             devices: heapless::Vec::new(),
@@ -231,6 +235,17 @@ impl Reader<'_> {
         })?;
         let city = read_city(csv.as_bytes(), Metres(cell_m));
         city.map(|city| city.heights).map_err(|fault| MissionFileError::City { path, fault })
+    }
+
+    fn rotation(&self, grid: &GridTable) -> Result<Degrees, MissionFileError> {
+        let Some(value) = &grid.rotation_deg else { return Ok(Degrees(0.0)) };
+        let rotation_deg = *value.get_ref();
+        if (-180.0..=180.0).contains(&rotation_deg) {
+            Ok(Degrees(rotation_deg))
+        } else {
+            Err(self
+                .fault(value, "rotation_deg is not from -180 to 180: give the clockwise angle from north"))
+        }
     }
 
     fn degrees(&self, value: &Spanned<f64>, limit: f64) -> Result<i32, MissionFileError> {
@@ -299,9 +314,9 @@ fn cell([x, y]: [i16; 2]) -> Cell {
 }
 
 fn cell_under(mission: &Mission, point: GeoPoint) -> Option<Cell> {
-    let (north, east) = mission.corner.offset_to(&point);
+    let (north, east) = mission.pose.corner.offset_to(&point);
     let position = Ned { north_m: north.0, east_m: east.0, down_m: 0.0 };
-    GridFrame::new(mission.grid(), mission.corner, mission.corner).cell(&position)
+    GridFrame::new(mission.grid(), mission.pose, mission.pose.corner).cell(&position)
 }
 
 fn degrees_e7(degrees: f64, limit: f64) -> Option<i32> {
@@ -328,8 +343,15 @@ struct FileOut<'m> {
 struct GridOut<'m> {
     corner_lat_deg: f64,
     corner_lon_deg: f64,
+    #[serde(skip_serializing_if = "is_zero")]
+    rotation_deg: f32,
     cell_m: f32,
     heights: &'m str,
+}
+
+// The signature that serde requires.
+fn is_zero(number: &f32) -> bool {
+    *number == 0.0
 }
 
 #[derive(Serialize)]
@@ -354,8 +376,9 @@ pub fn write(mission: &Mission, heights: &str) -> String {
         terminal: pair(mission.terminal),
         battery_units: mission.budget.0,
         grid: GridOut {
-            corner_lat_deg: f64::from(mission.corner.lat_deg_e7) / 1e7,
-            corner_lon_deg: f64::from(mission.corner.lon_deg_e7) / 1e7,
+            corner_lat_deg: f64::from(mission.pose.corner.lat_deg_e7) / 1e7,
+            corner_lon_deg: f64::from(mission.pose.corner.lon_deg_e7) / 1e7,
+            rotation_deg: mission.pose.rotation.0,
             cell_m: mission.grid().cell().0,
             heights,
         },

@@ -8,20 +8,24 @@
 //! | 2 | version, [`VERSION`] |
 //! | 2 | length of the body |
 //! | 4 | CRC-32 (ISO-HDLC) of the body |
-//! | body | grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (4 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
+//! | body | grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); rotation, degrees clockwise from north (f32; not in version 2); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (4 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
 //!
 //! Whatever follows the body is ignored, so the image may stand in a longer section of flash.
 
 use crate::{DeviceSite, MAX_DEVICES, Mission};
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap, MAX_CELLS, Metres};
+use gleaner_units::{
+    BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap, MAX_CELLS, Metres,
+};
 use heapless::Vec;
 
 /// The layout above.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
+/// The layout without the grid's rotation, which is still read: the rotation is then 0.
+const UNROTATED: u16 = 2;
 const MAGIC: [u8; 4] = *b"GLNM";
 const HEADER_BYTES: usize = 12;
-const FIXED_BYTES: usize = 26;
+const FIXED_BYTES: usize = 30;
 const DEVICE_BYTES: usize = 12;
 /// The longest image.
 pub const IMAGE_BYTES_MAX: usize =
@@ -73,8 +77,9 @@ pub fn encode(mission: &Mission) -> ImageBytes {
     put(&grid.width().to_le_bytes());
     put(&grid.height().to_le_bytes());
     put(&grid.cell().0.to_le_bytes());
-    put(&mission.corner.lat_deg_e7.to_le_bytes());
-    put(&mission.corner.lon_deg_e7.to_le_bytes());
+    put(&mission.pose.corner.lat_deg_e7.to_le_bytes());
+    put(&mission.pose.corner.lon_deg_e7.to_le_bytes());
+    put(&mission.pose.rotation.0.to_le_bytes());
     put(&mission.terminal.x.to_le_bytes());
     put(&mission.terminal.y.to_le_bytes());
     put(&mission.budget.0.to_le_bytes());
@@ -117,7 +122,7 @@ pub fn decode(bytes: &[u8]) -> Result<Mission, ImageError> {
         return Err(ImageError::Absent);
     }
     let version = header.u16()?;
-    if version != VERSION {
+    if ![UNROTATED, VERSION].contains(&version) {
         return Err(ImageError::Version(version));
     }
     let length = usize::from(header.u16()?);
@@ -126,7 +131,7 @@ pub fn decode(bytes: &[u8]) -> Result<Mission, ImageError> {
     if CRC.checksum(body) != checksum {
         return Err(ImageError::Checksum);
     }
-    Reader(body).mission()
+    Reader(body).mission(version)
 }
 
 /// The bytes not yet read.
@@ -163,13 +168,16 @@ impl<'b> Reader<'b> {
         Ok(Cell::new(x, y))
     }
 
-    fn mission(mut self) -> Result<Mission, ImageError> {
+    fn mission(mut self, version: u16) -> Result<Mission, ImageError> {
         let (width, height, cell_m) = (self.u16()?, self.u16()?, self.f32()?);
         let grid = Grid::new(width, height, Metres(cell_m)).map_err(|_| ImageError::Value)?;
         let mut mission = Mission {
             heights: HeightMap::flat(grid),
             fence: CellSet::empty(grid),
-            corner: GeoPoint { lat_deg_e7: self.i32()?, lon_deg_e7: self.i32()? },
+            pose: GridPose {
+                corner: GeoPoint { lat_deg_e7: self.i32()?, lon_deg_e7: self.i32()? },
+                rotation: Degrees(if version == UNROTATED { 0.0 } else { self.f32()? }),
+            },
             terminal: self.cell()?,
             budget: BatteryUnits(self.f32()?),
             devices: Vec::new(),
@@ -215,7 +223,10 @@ mod tests {
         Mission {
             heights,
             fence,
-            corner: GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 },
+            pose: GridPose {
+                corner: GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 },
+                rotation: Degrees(-12.5),
+            },
             terminal: Cell::new(1, 0),
             budget: BatteryUnits(80.0),
             devices: (0..devices).map(site).collect(),
@@ -231,6 +242,24 @@ mod tests {
             assert_eq!(decode(&image), Ok(mission), "what follows is ignored");
         }
         assert_eq!(encode(&mission(64, 32, 64)).len(), IMAGE_BYTES_MAX);
+    }
+
+    #[test]
+    fn images_without_rotation_are_still_read() {
+        let mut mission = mission(12, 9, 6);
+        let current = encode(&mission);
+        // Version 2: the same body without the four bytes of the rotation.
+        let rotation = HEADER_BYTES + 16;
+        let body = [&current[HEADER_BYTES..rotation], &current[rotation + 4..]].concat();
+        let mut old = MAGIC.to_vec();
+        old.extend(UNROTATED.to_le_bytes());
+        old.extend((body.len() as u16).to_le_bytes());
+        old.extend(CRC.checksum(&body).to_le_bytes());
+        old.extend(body);
+        mission.pose.rotation = Degrees(0.0);
+        assert_eq!(decode(&old), Ok(mission));
+        old[4] = 1;
+        assert_eq!(decode(&old), Err(ImageError::Version(1)));
     }
 
     #[test]

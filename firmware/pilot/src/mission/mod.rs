@@ -6,7 +6,7 @@ pub mod image;
 
 use core::fmt;
 use gleaner_guard::{Guard, GuardError};
-use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, HeightMap};
+use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -31,8 +31,8 @@ pub struct Mission {
     pub heights: HeightMap,
     /// The cells that may be flown over.
     pub fence: CellSet,
-    /// South-west corner of cell (0, 0).
-    pub corner: GeoPoint,
+    /// Position and rotation of the grid.
+    pub pose: GridPose,
     /// The cell that ends the mission; the aircraft lands there.
     pub terminal: Cell,
     /// The most battery that the mission may use (paper, B).
@@ -50,6 +50,8 @@ pub enum MissionError {
     Guard(GuardError),
     /// The corner is no point of the globe.
     Corner,
+    /// The grid's rotation is not an angle from -180 to 180 degrees.
+    Rotation,
     /// The battery budget is not a positive number.
     Budget,
     /// This device stands outside the city.
@@ -75,6 +77,7 @@ impl fmt::Display for MissionError {
             MissionError::FenceGrid => write!(f, "the fence belongs to another grid than the city"),
             MissionError::Guard(error) => write!(f, "{error}"),
             MissionError::Corner => write!(f, "the grid's corner is not a latitude and longitude"),
+            MissionError::Rotation => write!(f, "the grid's rotation is not from -180 to 180 degrees"),
             MissionError::Budget => write!(f, "battery_units is not a number above 0"),
             MissionError::DeviceOutside { id } => write!(f, "device {id} stands outside the city"),
             MissionError::DuplicateDevice { id } => write!(f, "two devices have the id {id}"),
@@ -92,7 +95,7 @@ impl Mission {
         Mission {
             heights: HeightMap::flat(Grid::ONE_CELL),
             fence: CellSet::empty(Grid::ONE_CELL),
-            corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 },
+            pose: GridPose { corner: GeoPoint { lat_deg_e7: 0, lon_deg_e7: 0 }, rotation: Degrees(0.0) },
             terminal: Cell::new(0, 0),
             budget: BatteryUnits(0.0),
             devices: Vec::new(),
@@ -119,9 +122,12 @@ impl Mission {
         if self.fence.grid() != self.grid() {
             return Err(MissionError::FenceGrid);
         }
-        let GeoPoint { lat_deg_e7, lon_deg_e7 } = self.corner;
+        let GridPose { corner: GeoPoint { lat_deg_e7, lon_deg_e7 }, rotation } = self.pose;
         if lat_deg_e7.unsigned_abs() > 900_000_000 || lon_deg_e7.unsigned_abs() > 1_800_000_000 {
             return Err(MissionError::Corner);
+        }
+        if !(-180.0..=180.0).contains(&rotation.0) {
+            return Err(MissionError::Rotation);
         }
         if !(self.budget.0.is_finite() && self.budget.0 > 0.0) {
             return Err(MissionError::Budget);

@@ -169,7 +169,7 @@ impl Flight {
         let position = vehicle.position.filter(Ned::is_finite);
         let position = position.filter(|_| now.since(self.ready_at) <= UNREADY);
         let position = position.ok_or(Outcome::Fault(Fault::PositionLost))?;
-        match self.watch.see(now, &position, &self.plan, &self.leg) {
+        match self.watch.see(now, vehicle.boot_ms, &position, &self.plan, &self.leg) {
             Finding::Fine => Ok(position),
             // A landing that was requested for another place cannot be laid out anew.
             Finding::Jumped if self.landing.is_some() => Err(Outcome::Fault(Fault::PositionLost)),

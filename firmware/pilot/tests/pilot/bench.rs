@@ -59,7 +59,7 @@ impl Bench {
     }
 
     pub fn centre(cell: Cell) -> Ned {
-        gleaner_units::GridFrame::new(mission().grid(), CORNER, Bench::origin())
+        gleaner_units::GridFrame::new(mission().grid(), mission().pose, Bench::origin())
             .centre(cell, HOME_DOWN_M - 60.0)
     }
 

@@ -59,6 +59,20 @@ fn a_position_that_jumps_goes_home_and_gives_up_the_second_time() {
 }
 
 #[test]
+fn positions_that_were_lost_on_the_way_are_no_jump() {
+    for (gap_ms, is_jump) in [(1_500, false), (100, true)] {
+        let mut rig = Rig::engaged();
+        rig.obeys = false;
+        rig.vehicle.boot_ms = Some(60_000);
+        rig.run(1.5);
+        rig.vehicle.boot_ms = Some(60_000 + gap_ms);
+        rig.vehicle.position.as_mut().unwrap().north_m += 15.0;
+        rig.step();
+        assert_eq!(rig.state() == State::Homing, is_jump, "{gap_ms} ms: {:?}", rig.texts);
+    }
+}
+
+#[test]
 fn an_unknown_battery_goes_home_and_a_jump_is_reported() {
     let mut rig = Rig::engaged();
     rig.run(1.0);

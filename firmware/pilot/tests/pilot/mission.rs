@@ -8,7 +8,7 @@ use gleaner_units::{BatteryUnits, Cell, CellSet, GeoPoint, Grid, Metres};
 #[test]
 fn each_fault_of_a_mission_is_named() {
     type Spoil = fn(&mut Mission);
-    let cases: [(MissionError, Spoil); 10] = [
+    let cases: [(MissionError, Spoil); 11] = [
         (MissionError::FenceGrid, |mission| {
             mission.fence = CellSet::full(Grid::new(4, 4, Metres(20.0)).unwrap());
         }),
@@ -18,7 +18,10 @@ fn each_fault_of_a_mission_is_named() {
             mission.fence = CellSet::empty(mission.grid());
             mission.fence.insert(TERMINAL);
         }),
-        (MissionError::Corner, |mission| mission.corner = GeoPoint { lat_deg_e7: i32::MIN, lon_deg_e7: 0 }),
+        (MissionError::Rotation, |mission| mission.pose.rotation = gleaner_units::Degrees(f32::NAN)),
+        (MissionError::Corner, |mission| {
+            mission.pose.corner = GeoPoint { lat_deg_e7: i32::MIN, lon_deg_e7: 0 }
+        }),
         (MissionError::Budget, |mission| mission.budget = BatteryUnits(f32::NAN)),
         (MissionError::Budget, |mission| mission.budget = BatteryUnits(0.0)),
         (MissionError::DeviceOutside { id: 9 }, |mission| mission.devices[1].cell = Cell::new(0, 6)),

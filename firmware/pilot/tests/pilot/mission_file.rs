@@ -2,7 +2,7 @@
 
 use gleaner_pilot::DeviceSite;
 use gleaner_pilot::mission_file::{read, write};
-use gleaner_units::{Cell, GeoPoint};
+use gleaner_units::{Cell, Degrees, GeoPoint};
 
 const TEXT: &str = r#"terminal = [2, 1]
 battery_units = 20.0
@@ -43,13 +43,33 @@ fn fails(text: &str) -> String {
 fn a_mission_survives_writing_and_reading() {
     let mission = read(TEXT, city).unwrap();
     assert_eq!(mission.terminal, Cell::new(2, 1));
-    assert_eq!(mission.corner, GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 });
+    assert_eq!(mission.pose.corner, GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 });
     assert_eq!(mission.heights.height_m(Cell::new(0, 0)), Some(1));
     assert_eq!(mission.fence.len(), 7);
     assert_eq!(mission.devices[0], DeviceSite { id: 7, cell: Cell::new(1, 1), data: 6000.0 });
     assert_eq!(mission.devices[1].cell, Cell::new(2, 0), "from latitude and longitude");
     let text = write(&mission, "city.csv");
     assert_eq!(read(&text, city).unwrap(), mission, "{text}");
+}
+
+#[test]
+fn rotated_grids_survive_writing_and_place_devices() {
+    let rotated = |degrees: &str| TEXT.replace("cell_m =", &format!("rotation_deg = {degrees}\ncell_m ="));
+    let mission = read(&rotated("0.0"), city).unwrap();
+    assert_eq!(mission, read(TEXT, city).unwrap(), "0 is the default");
+    // The north axis points east, and the east axis south.
+    let east =
+        TEXT.replace("lat_deg = -35.36317\nlon_deg = 149.16568", "lat_deg = -35.36335\nlon_deg = 149.16555");
+    let east = east.replace("cell_m =", "rotation_deg = 90.0\ncell_m =");
+    let mission = read(&east, city).unwrap();
+    assert_eq!(mission.pose.rotation, Degrees(90.0));
+    assert_eq!(mission.devices[1].cell, Cell::new(0, 1), "28 m east and 10 m south of the corner");
+    let text = write(&mission, "city.csv");
+    assert_eq!(read(&text, city).unwrap(), mission, "{text}");
+    assert_eq!(
+        fails(&rotated("200.0")),
+        "line 7: rotation_deg is not from -180 to 180: give the clockwise angle from north"
+    );
 }
 
 #[test]

@@ -8,7 +8,8 @@ use gleaner_pilot::{
 };
 use gleaner_policy::{Attention, DeviceState, Inference, Policy, Tokens};
 use gleaner_units::{
-    Action, BatteryUnits, Cell, CellSet, Duration, GeoPoint, Grid, GridFrame, HeightMap, Instant, Metres, Ned,
+    Action, BatteryUnits, Cell, CellSet, Degrees, Duration, GeoPoint, Grid, GridFrame, GridPose, HeightMap,
+    Instant, Metres, Ned,
 };
 
 pub const CORNER: GeoPoint = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 };
@@ -29,7 +30,7 @@ pub fn mission() -> Mission {
     let mission = Mission {
         heights: HeightMap::flat(grid),
         fence,
-        corner: CORNER,
+        pose: GridPose { corner: CORNER, rotation: Degrees(0.0) },
         terminal: TERMINAL,
         budget: BatteryUnits(30.0),
         devices: heapless::Vec::from_slice(&[site(7, 2, 4, 6000.0), site(9, 5, 1, 2000.0)]).unwrap(),
@@ -178,7 +179,7 @@ impl Rig {
     }
 
     pub fn frame(&self) -> GridFrame {
-        GridFrame::new(self.mission.grid(), CORNER, CORNER.offset_by(Metres(-100.0), Metres(50.0)))
+        GridFrame::new(self.mission.grid(), self.mission.pose, CORNER.offset_by(Metres(-100.0), Metres(50.0)))
     }
 
     pub fn centre(&self, cell: Cell) -> Ned {

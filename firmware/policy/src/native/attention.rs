@@ -1,7 +1,7 @@
 //! Multi-head attention of one block of tokens towards all tokens present.
 
 use super::kernel::add_product;
-use super::{BLOCKS, Block, HEAD_WIDTH, HEADS, LANES, PANEL, WIDTH};
+use super::shape::{BLOCKS, Block, HEAD_WIDTH, HEADS, LANES, PANEL, WIDTH};
 use crate::{Attention, TOKENS};
 
 /// Weights of one head for the queries of one block: `[key block][key lane][query lane]`.
@@ -10,10 +10,10 @@ pub(super) type Weights = [[[f32; LANES]; LANES]; BLOCKS];
 /// Keys, then values of one block.
 pub(super) type KeyValue = Block<{ 2 * WIDTH }>;
 
-/// Softmax(q k^T) v for each head and each query of a block. The query carries the division by the root of the
-/// head's width already.
+/// Softmax(q k^T) v for each head and each query of a block. The query is already divided by the root of the head's
+/// width.
 ///
-/// `weights` is scratch; each head's are given to `see`.
+/// `weights` is scratch memory. `observe` receives the weights of each head.
 ///
 /// # Cost
 /// `2 WIDTH` multiply-adds and [`HEADS`] exponentials for each pair of a query and a key.
@@ -23,7 +23,7 @@ pub(super) fn attend(
     tokens: usize,
     weights: &mut Weights,
     mixed: &mut Block<WIDTH>,
-    mut see: impl FnMut(&Weights),
+    mut observe: impl FnMut(&Weights),
 ) {
     let (query, _) = query.as_chunks::<HEAD_WIDTH>();
     let (mixed, _) = mixed.as_chunks_mut::<HEAD_WIDTH>();
@@ -32,17 +32,17 @@ pub(super) fn attend(
             *weights = scores(query, part(block, head));
         }
         softmax(weights, tokens);
-        see(weights);
+        observe(weights);
         mix(weights, key_value, HEADS + head, tokens, mixed);
     }
 }
 
-/// How many blocks so many tokens need.
+/// Blocks of `tokens` tokens.
 pub(super) fn blocks(tokens: usize) -> usize {
     tokens.div_ceil(LANES)
 }
 
-/// The rows of one head: of the keys, or of the values when `head` counts on.
+/// The rows of one head: the keys for `head` below [`HEADS`], then the values.
 fn part(block: &KeyValue, head: usize) -> &[[f32; LANES]; HEAD_WIDTH] {
     const NONE: [[f32; LANES]; HEAD_WIDTH] = [[0.0; LANES]; HEAD_WIDTH];
     let (parts, _) = block.as_chunks::<HEAD_WIDTH>();
@@ -57,7 +57,7 @@ fn scores(query: &[[f32; LANES]; HEAD_WIDTH], key: &[[f32; LANES]; HEAD_WIDTH]) 
     sums
 }
 
-/// Over the keys, for each query. Lanes without a token get weight 0.
+/// Softmax over the keys, for each query. Lanes without a token get weight 0.
 fn softmax(weights: &mut Weights, tokens: usize) {
     let keys = weights.as_flattened_mut();
     let mut largest = [f32::MIN; LANES];
@@ -84,7 +84,7 @@ fn softmax(weights: &mut Weights, tokens: usize) {
     }
 }
 
-/// The values of one head, weighed.
+/// The weighted sum of one head's values.
 fn mix(
     weights: &Weights,
     key_value: &[KeyValue; BLOCKS],
@@ -106,7 +106,7 @@ fn mix(
     }
 }
 
-/// Adds one head's weights of the queries of block `block` to the mean over the heads.
+/// Adds one head's weights, for the queries of block `block`, to the mean over the heads.
 pub(super) fn add_mean(attention: &mut Attention, block: usize, tokens: usize, weights: &Weights) {
     let keys = weights.as_flattened();
     let rows = attention.0.iter_mut().take(tokens).skip(block.saturating_mul(LANES)).take(LANES);

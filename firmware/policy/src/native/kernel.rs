@@ -1,12 +1,12 @@
-//! The linear layer, where nearly all the time goes.
+//! The linear layer: most of the inference time.
 
-use super::PANEL;
 use super::network::{Linear, Stored};
+use super::shape::PANEL;
 
 /// `y = x W^T + b` for `LANES` tokens side by side.
 ///
-/// Per input, `PANEL` weights and `LANES` numbers are loaded for `PANEL * LANES` multiply-adds, whose sums stay
-/// in registers: 29 instructions for 20 on a Cortex-M4 instead of the 60 of one dot product after the other.
+/// For each input, `PANEL` weights and `LANES` numbers are loaded for `PANEL * LANES` multiply-adds, whose sums stay in
+/// registers. On a Cortex-M4 that is 29 instructions for 20 multiply-adds; dot products one by one take 60.
 ///
 /// # Cost
 /// `INPUTS * 4 PANELS * LANES` multiply-adds.

@@ -1,17 +1,19 @@
-//! Where each weight lies in a blob.
+//! The network's weights, in the order of a blob.
 
-use super::blob::{BlobError, Reader};
-use super::{FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LAYERS, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS};
+use super::reader::{BlobError, Reader};
+use super::shape::{
+    FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LAYERS, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS,
+};
 use crate::LOCAL_MAP_CELLS;
-use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
+use crate::schema::{DEVICE_FEATURES, PREFERENCE_FEATURES, UAV_FEATURES};
 use zerocopy::{FromBytes, Immutable, KnownLayout};
 
-/// The weights of [`PANEL`] outputs for one input, as they are stored.
+/// Stored weights of [`PANEL`] outputs for one input.
 pub(super) trait Stored: Copy + FromBytes + Immutable + KnownLayout + 'static {
-    /// Whether an output must be multiplied by its scale.
+    /// Whether each output has a scale.
     const SCALED: bool;
 
-    /// The numbers that enter the multiplication.
+    /// The weights as floats, before the scale.
     fn widen(self) -> [f32; PANEL];
 }
 
@@ -33,7 +35,7 @@ impl Stored for [i16; PANEL] {
     }
 }
 
-/// A linear layer: for each output a scale and a bias, and the weights in panels.
+/// A linear layer: a scale and a bias for each output, and the weights in panels.
 #[derive(Clone, Copy)]
 pub(super) struct Linear<'m, W, const INPUTS: usize, const PANELS: usize> {
     pub scale: &'m [[f32; PANEL]; PANELS],
@@ -64,7 +66,7 @@ impl<'m> Norm<'m> {
 /// One encoder layer.
 #[derive(Clone, Copy)]
 pub(super) struct Encoder<'m, W> {
-    /// With the division by the root of the head's width in it.
+    /// Divided by the root of the head's width.
     pub query: Linear<'m, W, WIDTH, WIDTH_PANELS>,
     pub key_value: Linear<'m, W, WIDTH, { 2 * WIDTH_PANELS }>,
     pub out: Linear<'m, W, WIDTH, WIDTH_PANELS>,
@@ -88,11 +90,11 @@ impl<'m, W: Stored> Encoder<'m, W> {
     }
 }
 
-/// The whole network, in the order in which it lies in the blob.
+/// The whole network, in blob order.
 #[derive(Clone, Copy)]
 pub(super) struct Network<'m, W> {
     pub project_uav: Linear<'m, W, UAV_FEATURES, WIDTH_PANELS>,
-    pub project_preference: Linear<'m, W, 2, WIDTH_PANELS>,
+    pub project_preference: Linear<'m, W, PREFERENCE_FEATURES, WIDTH_PANELS>,
     pub project_map: Linear<'m, W, LOCAL_MAP_CELLS, WIDTH_PANELS>,
     pub project_device: Linear<'m, W, DEVICE_FEATURES, WIDTH_PANELS>,
     pub encoder: [Encoder<'m, W>; LAYERS],

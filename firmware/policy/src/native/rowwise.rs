@@ -1,9 +1,9 @@
-//! What happens to each token on its own: layer norm and rectifier.
+//! Operations on each token alone: layer norm and ReLU.
 
 use super::network::Norm;
-use super::{Block, LANES, LAYER_NORM_EPSILON, WIDTH};
+use super::shape::{Block, LANES, LAYER_NORM_EPSILON, WIDTH};
 
-/// `x = norm(x + change) * gain + bias` for each lane; biased variance, as PyTorch and ONNX have it.
+/// `x = norm(x + change) * gain + bias` for each lane, with the biased variance of PyTorch and ONNX.
 pub(super) fn add_and_norm(norm: &Norm<'_>, x: &mut Block<WIDTH>, change: &Block<WIDTH>) {
     let mut mean = [0.0; LANES];
     for (x, change) in x.iter_mut().zip(change) {
@@ -28,7 +28,7 @@ pub(super) fn add_and_norm(norm: &Norm<'_>, x: &mut Block<WIDTH>, change: &Block
     }
 }
 
-/// Negative numbers become zero; what is not a number stays so.
+/// ReLU; NaN stays NaN.
 pub(super) fn rectify<const LANES: usize>(x: &mut [[f32; LANES]]) {
     for x in x.iter_mut().flatten() {
         *x = if *x < 0.0 { 0.0 } else { *x };

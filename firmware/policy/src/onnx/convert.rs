@@ -1,68 +1,21 @@
-//! From the ONNX file to the blob of the native engine.
+//! Conversion of the ONNX file to the blob of the native engine.
 
+use super::error::{ConvertError, ModelError};
+use super::metadata::{ModelInfo, unseal};
 use super::pb::tensor_proto::DataType;
 use super::pb::{GraphProto, TensorProto};
-use super::{ModelError, ModelInfo, unseal};
 use crate::native::{
     AlignedBytes, FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, HEAD_WIDTH, Header, LAYERS, LOGIT_PANELS, Model,
     NativePolicy, PANEL, SOURCE_BYTES, WIDTH, WeightFormat, Workspace, crc32,
 };
-use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
+use crate::schema::{DEVICE_FEATURES, PREFERENCE_FEATURES, UAV_FEATURES};
 use crate::{Golden, K_MAX, LOCAL_MAP_CELLS, Policy, SelfTestError, self_test};
 use gleaner_units::{Action, ActionMask};
 
-/// Why a model cannot be converted.
-#[derive(Debug, thiserror::Error)]
-pub enum ConvertError {
-    /// The model is unfit to fly in any engine.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// A weight is missing or has another shape: the native engine computes one network only.
-    #[error(
-        "the model has no weight `{name}` of {rows} x {columns} numbers: the native engine runs only what \
-         `gleaner-train export` writes; use the engine tract"
-    )]
-    Weight {
-        /// Its name in the graph.
-        name: String,
-        /// Outputs.
-        rows: usize,
-        /// Inputs; 1 for a bias.
-        columns: usize,
-    },
-    /// The blob has no room for such a long text.
-    #[error("the {what} `{text}` is longer than {room} bytes: export the model under a shorter one")]
-    TooLong {
-        /// Name or version.
-        what: &'static str,
-        /// The text.
-        text: String,
-        /// Bytes that there are.
-        room: usize,
-    },
-    /// The shortened weights choose another action.
-    #[error("with these weights golden pair {pair} gets another action: convert with --weights f32")]
-    Disagrees {
-        /// Index of the golden pair.
-        pair: usize,
-    },
-    /// The graph has other operations than the native engine computes.
-    #[error("the graph has {found} operations `{operator}` instead of {expected}: use the engine tract")]
-    Graph {
-        /// Which.
-        operator: &'static str,
-        /// How many there are.
-        found: usize,
-        /// How many the network has.
-        expected: usize,
-    },
-}
-
-/// The blob for [`Model::read`], after the native engine reproduced the golden pairs with it; the same bytes each
-/// time.
+/// Converts an ONNX model to a blob for [`Model::read`] and checks the blob's golden pairs. Deterministic.
 ///
-/// With 16 bits the golden pairs of the blob hold the answers of these weights: they prove on board that
-/// nothing has changed since the conversion, and the conversion sees to it that they choose the same actions.
+/// With 16-bit weights the blob's golden logits are recomputed with those weights, so that the self-test on board is
+/// exact. The conversion fails if a golden pair then selects another action.
 ///
 /// # Errors
 /// [`ConvertError`].
@@ -74,21 +27,21 @@ pub fn convert(onnx: &[u8], format: WeightFormat) -> Result<Vec<u8>, ConvertErro
     network.network()?;
     if format != WeightFormat::F32 {
         let trained = blob(&info, &goldens, format, &network.bytes)?;
-        answer(&trained, &mut goldens)?;
+        recompute_goldens(&trained, &mut goldens)?;
     }
     let bytes = blob(&info, &goldens, format, &network.bytes)?;
-    prove(&bytes)?;
+    check_goldens(&bytes)?;
     Ok(bytes)
 }
 
-fn prove(bytes: &[u8]) -> Result<(), ModelError> {
+fn check_goldens(bytes: &[u8]) -> Result<(), ModelError> {
     let aligned = AlignedBytes::new(bytes);
     let model = Model::read(aligned.as_slice())?;
     Ok(self_test(&mut NativePolicy::new(model, &mut Workspace::new()), model.goldens())?)
 }
 
-/// Puts the answers of the blob's own weights into the golden pairs.
-fn answer(bytes: &[u8], goldens: &mut [Golden]) -> Result<(), ConvertError> {
+/// Replaces the golden logits by those of the blob's own weights.
+fn recompute_goldens(bytes: &[u8], goldens: &mut [Golden]) -> Result<(), ConvertError> {
     let aligned = AlignedBytes::new(bytes);
     let mut workspace = Workspace::new();
     let mut policy =
@@ -112,7 +65,7 @@ fn blob(
 ) -> Result<Vec<u8>, ConvertError> {
     let mut source = [0; SOURCE_BYTES];
     for (byte, digits) in source.iter_mut().zip(info.sha256.as_bytes().as_chunks::<2>().0) {
-        // A digest that `unseal` made is hexadecimal.
+        // `unseal` made the digest, so it is hexadecimal.
         *byte =
             digits.iter().fold(0, |byte, &digit| byte << 4 | (digit as char).to_digit(16).unwrap_or(0) as u8);
     }
@@ -144,8 +97,7 @@ fn le_bytes<'n>(numbers: impl IntoIterator<Item = &'n f32>) -> Vec<u8> {
     numbers.into_iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// A graph with other activations would carry the same weights. This finds an honest change of the exporter
-/// early; the golden pairs find the rest.
+/// Finds a graph with other activations, whose weights would look the same. The golden pairs find every other change.
 fn check_operators(graph: &GraphProto) -> Result<(), ConvertError> {
     let linear = 4 + 4 * LAYERS + 2;
     let counted =
@@ -179,11 +131,11 @@ impl Writer<'_> {
         self.bytes.append(&mut le_bytes(numbers));
     }
 
-    /// In the order of `Network`.
+    /// All weights, in the order of `network::Network`.
     fn network(&mut self) -> Result<(), ConvertError> {
         let projectors = [
             ("project_uav", UAV_FEATURES),
-            ("project_preference", 2),
+            ("project_preference", PREFERENCE_FEATURES),
             ("project_map", LOCAL_MAP_CELLS),
             ("project_device", DEVICE_FEATURES),
         ];
@@ -206,7 +158,7 @@ impl Writer<'_> {
         let name = |part: &str| format!("{encoder}.{part}");
         let mut query = self.layer(&name("qkv"), 3 * WIDTH, WIDTH)?;
         let key_value = query.split_off(WIDTH);
-        // A power of two: no bit is lost.
+        // A power of two: exact.
         query.multiply(1.0 / (HEAD_WIDTH as f32).sqrt());
         self.linear(&query);
         self.linear(&key_value);
@@ -271,7 +223,7 @@ impl Writer<'_> {
         }
     }
 
-    /// The weights of one input in one panel, in units of their scales.
+    /// The weights of one input in one panel, divided by their scales.
     fn column(&mut self, weights: [f32; PANEL]) {
         match self.format {
             WeightFormat::F32 => self.numbers(&weights),
@@ -282,7 +234,7 @@ impl Writer<'_> {
     }
 }
 
-/// `y = x W^T + b`, the weight row by row.
+/// `y = x W^T + b`, with the weight row by row.
 struct Layer {
     inputs: usize,
     weight: Vec<f32>,
@@ -290,13 +242,13 @@ struct Layer {
 }
 
 impl Layer {
-    /// Cuts off the outputs from `outputs` on.
+    /// Removes and returns the outputs from `outputs` on.
     fn split_off(&mut self, outputs: usize) -> Layer {
         let (weight, bias) = (self.weight.split_off(outputs * self.inputs), self.bias.split_off(outputs));
         Layer { inputs: self.inputs, weight, bias }
     }
 
-    /// For each output, so that its largest weight becomes the largest code.
+    /// A scale for each output that maps its largest weight to the largest code.
     fn scales(&self, largest_code: f32) -> Vec<f32> {
         let largest = |row: &[f32]| row.iter().fold(0.0, |largest, weight| f32::max(largest, weight.abs()));
         let scale = |largest: f32| if largest > 0.0 { largest / largest_code } else { 1.0 };
@@ -307,7 +259,7 @@ impl Layer {
         self.weight.iter_mut().chain(&mut self.bias).for_each(|number| *number *= factor);
     }
 
-    /// Adds outputs that are zero.
+    /// Appends outputs that are zero, up to `outputs`.
     fn pad(&mut self, outputs: usize) {
         self.weight.resize(outputs * self.inputs, 0.0);
         self.bias.resize(outputs, 0.0);

@@ -1,11 +1,11 @@
-//! The inputs and outputs that every model has.
+//! The inputs and outputs of every model.
 
-use super::ModelError;
+use super::error::ModelError;
 use super::pb::tensor_proto::{DataLocation, DataType};
 use super::pb::tensor_shape_proto::dimension::Value as Dim;
 use super::pb::type_proto::Value as Type;
 use super::pb::{GraphProto, TensorProto, ValueInfoProto};
-use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
+use crate::schema::{DEVICE_FEATURES, PREFERENCE_FEATURES, UAV_FEATURES};
 use crate::{K_MAX, LOCAL_MAP_CELLS, TOKENS};
 use gleaner_units::Action;
 use std::collections::HashSet;
@@ -19,13 +19,13 @@ pub struct Port {
     pub shape: &'static [usize],
 }
 
-/// The inputs, in physical units (see [`crate::schema`]); `device_mask` is 1 for a device that is present and 0
-/// for one that is not, whose row may then hold anything.
+/// The inputs, in physical units (see [`crate::schema`]). `device_mask` is 1 for each device that is present; the rows of
+/// the others are ignored.
 pub const INPUTS: [Port; 5] = [
     Port { name: "uav", shape: &[UAV_FEATURES] },
     Port { name: "devices", shape: &[K_MAX, DEVICE_FEATURES] },
     Port { name: "device_mask", shape: &[K_MAX] },
-    Port { name: "preference", shape: &[2] },
+    Port { name: "preference", shape: &[PREFERENCE_FEATURES] },
     Port { name: "local_map", shape: &[LOCAL_MAP_CELLS] },
 ];
 
@@ -33,7 +33,7 @@ pub const INPUTS: [Port; 5] = [
 pub const OUTPUTS: [Port; 2] =
     [Port { name: "logits", shape: &[Action::COUNT] }, Port { name: "attention", shape: &[TOKENS, TOKENS] }];
 
-/// Whether the graph has exactly the ports of the contract and carries its weights itself.
+/// Checks that the graph has exactly the contract's inputs and outputs, and that the file contains all weights.
 pub(super) fn check(graph: &GraphProto) -> Result<(), ModelError> {
     let weights: HashSet<&str> = graph.initializer.iter().map(|tensor| tensor.name.as_str()).collect();
     let inputs: Vec<&ValueInfoProto> =
@@ -49,7 +49,7 @@ pub(super) fn check(graph: &GraphProto) -> Result<(), ModelError> {
     let mut tensors = graph.initializer.iter().chain(constants(graph));
     match tensors.find(|tensor| tensor.data_location == Some(DataLocation::External as i32)) {
         Some(tensor) => {
-            Err(ModelError::Interface(format!("the weight `{}` lies in another file", tensor.name)))
+            Err(ModelError::Interface(format!("the weight `{}` is in another file", tensor.name)))
         }
         None => Ok(()),
     }
@@ -82,15 +82,15 @@ fn describe_port(port: &Port) -> String {
     format!("f32 [N,{}]", shape.join(","))
 }
 
-/// The first dimension is the batch whatever its name; a fixed one is told by its number.
+/// The first axis is the batch, whatever its name; a fixed batch is shown as a number.
 fn describe(value: &ValueInfoProto) -> String {
     let Some(Type::TensorType(tensor)) = value.r#type.as_ref().and_then(|t| t.value.as_ref()) else {
         return String::from("without a type");
     };
     let element = match DataType::try_from(tensor.elem_type) {
-        Ok(DataType::Float) => "f32",
-        Ok(other) => other.as_str_name(),
-        Err(_) => "of unknown element type",
+        Ok(DataType::Float) => "f32".into(),
+        Ok(other) => format!("{other:?}").to_lowercase(),
+        Err(_) => String::from("of unknown element type"),
     };
     let Some(shape) = &tensor.shape else {
         return format!("{element} without a shape");

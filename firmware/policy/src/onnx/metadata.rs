@@ -1,7 +1,8 @@
-//! What travels in the file beside the graph, written and read here so that both ends agree.
+//! The metadata of a model file: writing, reading and the seal.
 
+use super::error::ModelError;
+use super::interface;
 use super::pb::{ModelProto, StringStringEntryProto};
-use super::{ModelError, interface};
 use crate::schema::{self, FEATURES};
 use crate::{Golden, K_MAX};
 use gleaner_units::Action;
@@ -9,7 +10,7 @@ use prost::Message;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// The metadata keys, in the order in which they are written.
+/// The metadata keys, in file order.
 mod key {
     pub const NAME: &str = "name";
     pub const VERSION: &str = "version";
@@ -28,55 +29,55 @@ mod key {
     pub const SHA256: &str = "sha256";
 }
 
-/// Who made the model, from what.
+/// Origin of a model.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelCard {
-    /// What people call it.
+    /// Name of the model.
     pub name: String,
     /// Version of the program that trained it.
     pub version: String,
-    /// Commit of the source that trained it.
+    /// Source commit of that program.
     pub commit: String,
-    /// The command that trains it again.
+    /// Command that reproduces the training.
     pub command: String,
-    /// Seed of the training.
+    /// Random seed of the training.
     pub seed: u64,
     /// Environment steps of the training.
     pub steps: u64,
-    /// The scenario that it was trained in.
+    /// Training scenario.
     pub scenario: String,
-    /// Hash of the city that it was trained in.
+    /// Hash of the training city.
     pub city_hash: u64,
 }
 
-/// What a program shows about a model that it has loaded.
+/// Description of a loaded model.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelInfo {
-    /// Who made it.
+    /// Its origin.
     #[serde(flatten)]
     pub card: ModelCard,
-    /// Numbers that were learned.
+    /// Trained parameters.
     pub parameters: usize,
-    /// [`schema::hash`] of the contract that it was trained for; after loading, this program's.
+    /// [`schema::hash`] of its observation contract; after loading, this program's.
     pub schema_hash: u64,
-    /// SHA-256 of the content, 64 hexadecimal digits: the identity of the model.
+    /// SHA-256 of the content, 64 hexadecimal digits, which identifies the model.
     pub sha256: String,
 }
 
-/// Everything that the trainer says about a model. The contract (schema hash, K_max, action order,
-/// normalisation) is not said but taken from the program that writes.
+/// Metadata that the trainer provides. The observation contract (schema hash, K_max, action order, normalisation) is
+/// that of the writing program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metadata {
-    /// Who made it.
+    /// Its origin.
     pub card: ModelCard,
-    /// Numbers that were learned.
+    /// Trained parameters.
     pub parameters: usize,
-    /// What it must answer.
+    /// The golden pairs.
     pub goldens: Vec<Golden>,
 }
 
 impl Metadata {
-    /// The entries of the file, without the seal.
+    /// The entries, without the seal.
     fn entries(&self) -> Vec<(&'static str, String)> {
         let card = &self.card;
         vec![
@@ -97,10 +98,10 @@ impl Metadata {
         ]
     }
 
-    /// Reads what [`seal`] wrote and compares the contract with this program's.
+    /// Reads the entries that [`seal`] wrote and compares the contract with this program's.
     ///
     /// # Errors
-    /// The first entry that is missing, unreadable or of another contract.
+    /// The first entry that is missing, malformed or of another contract.
     fn read(model: &ModelProto, sha256: String) -> Result<(ModelInfo, Vec<Golden>), ModelError> {
         let schema_hash = parse_hex(model, key::SCHEMA_HASH)?;
         if schema_hash != schema::hash() {
@@ -131,7 +132,7 @@ impl Metadata {
     }
 }
 
-/// Adds the metadata and the seal, and encodes: the bytes of the file. Metadata that `model` had are replaced.
+/// Adds metadata and seal to `model`, replacing any metadata, and encodes the file.
 #[must_use]
 pub fn seal(mut model: ModelProto, metadata: &Metadata) -> Vec<u8> {
     let property = |(key, value): (&str, String)| StringStringEntryProto { key: key.into(), value };
@@ -141,10 +142,10 @@ pub fn seal(mut model: ModelProto, metadata: &Metadata) -> Vec<u8> {
     model.encode_to_vec()
 }
 
-/// Decodes the file and checks the seal, the contract and the interface; does not run anything.
+/// Decodes a file and checks seal, contract and interface. Runs no engine.
 ///
 /// # Errors
-/// [`ModelError`], except those of the engine and the self-test.
+/// [`ModelError`], except those of engine and self-test.
 pub fn unseal(bytes: &[u8]) -> Result<(ModelProto, ModelInfo, Vec<Golden>), ModelError> {
     let model = ModelProto::decode(bytes).map_err(|cause| ModelError::NotOnnx(cause.to_string()))?;
     let Some(graph) = &model.graph else {
@@ -174,7 +175,7 @@ fn action_order() -> String {
     Action::ALL.map(Action::name).join(",")
 }
 
-/// The feature table as JSON, for people and for engines that are not ours.
+/// The feature table as JSON, for readers and other engines.
 fn normalisation() -> serde_json::Value {
     let finite = |limit: f32| limit.is_finite().then_some(limit);
     FEATURES

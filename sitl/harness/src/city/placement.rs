@@ -5,6 +5,10 @@ use super::footprints::Footprint;
 use geo::CoordsIter;
 use gleaner_units::{GeoPoint, Grid, MAX_CELLS, Metres};
 
+/// Points are rounded to 1e-7 degrees, about 1.1 cm. An outline that is this much longer than a whole number of cells
+/// needs no further cell.
+const ROUNDING_M: f64 = 0.05;
+
 /// South, west, north and east edge, degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct BoundingBox {
@@ -70,8 +74,8 @@ impl Placement {
             (south, north) = (south.min(y), north.max(y));
         }
         let cell_m = f64::from(cell.0);
-        let (width, height) =
-            (((east - west) / cell_m).ceil().max(1.0), ((north - south) / cell_m).ceil().max(1.0));
+        let cells = |length_m: f64| ((length_m - ROUNDING_M) / cell_m).ceil().max(1.0);
+        let (width, height) = (cells(east - west), cells(north - south));
         let size = ImportError::GridSize { width, height, most: MAX_CELLS };
         if width * height > MAX_CELLS as f64 {
             return Err(size);

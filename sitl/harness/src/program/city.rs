@@ -9,7 +9,7 @@ use crate::city::placement::{Placement, derived_rotation_deg};
 use crate::city::plan::{Plan, cell_under};
 use crate::city::raster::rasterise;
 use gleaner_pilot::{DeviceSite, MAX_DEVICES, Mission, mission_file};
-use gleaner_units::{BatteryUnits, Cell, CellSet, HeightMap, Metres};
+use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GridPose, HeightMap, Metres};
 use gleaner_world::City;
 use std::path::{Path, PathBuf};
 
@@ -135,7 +135,7 @@ fn write_mission(
     let mission = Mission {
         heights,
         fence,
-        corner: placement.corner,
+        pose: GridPose { corner: placement.corner, rotation: Degrees(placement.rotation_deg as f32) },
         terminal,
         budget: BatteryUnits(order.battery),
         devices: devices.into_iter().collect(),

@@ -33,8 +33,8 @@ const DOWN_M: f32 = 0.0;
 /// Runs until it is interrupted.
 pub(super) fn radio(order: &RadioOrder) -> Result<bool, ProgramError> {
     let mission = load::read_mission(&order.mission)?;
-    let corner = mission.corner;
-    let grid = GridFrame::new(mission.grid(), corner, corner);
+    let corner = mission.pose.corner;
+    let grid = GridFrame::new(mission.grid(), mission.pose, corner);
     let plan = MissionPlan::new(ScenarioKind::ReachDestination, order.seed);
     let setup = MissionSetup::of_mission(mission, plan).map_err(FlightError::from)?;
     let modem = Modem::new(setup.world.clone(), &setup.realization, setup.seed());
@@ -219,7 +219,7 @@ fn base64(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_units::Db;
+    use gleaner_units::{Db, Degrees, GridPose};
 
     fn report() -> Report {
         Report { device: 0x0102_0304, snr: Db(2.5), remaining: Some(1000.0), age_ms: 200 }
@@ -250,7 +250,8 @@ mod tests {
     fn the_follower_finds_the_cell_under_the_vehicle() {
         let corner = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 };
         let grid = gleaner_units::Grid::new(40, 30, Metres(20.0)).unwrap();
-        let mut follower = Follower::new(GridFrame::new(grid, corner, corner), corner);
+        let mut follower =
+            Follower::new(GridFrame::new(grid, GridPose { corner, rotation: Degrees(0.0) }, corner), corner);
         follower.follow(corner.offset_by(Metres(50.0), Metres(90.0)));
         assert_eq!(follower.cell, Some(Cell::new(4, 2)));
         follower.follow(corner.offset_by(Metres(-5000.0), Metres(0.0)));

@@ -60,7 +60,7 @@ pub(super) const DEFAULTS: Defaults = &[
 /// From power on to the first heartbeat after a reboot.
 const BOOT_TIME: Duration = Duration::from_secs(3);
 /// From the take-off command to leaving the ground: 30.3 s to 60 m were measured.
-const SPIN_UP: Duration = Duration::from_millis(6_300);
+const SPIN_UP: Duration = Duration::from_millis(8_450);
 /// Ground speed never exceeded 10.1 m/s on a leg of 200 m, with `MPC_XY_VEL_MAX` 12.
 const FASTEST_LEG_MPS: f64 = 10.1;
 

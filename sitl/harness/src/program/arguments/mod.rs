@@ -15,10 +15,10 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
-use gleaner_units::BatteryUnits;
+use gleaner_units::{BatteryUnits, Degrees};
 use gleaner_world::ScenarioKind;
 use std::path::PathBuf;
-use values::{autopilot, scenario, speed, speedup, switch, units, weight};
+use values::{autopilot, grid_rotation, scenario, speed, speedup, switch, units, weight};
 
 /// A simulated city with an aircraft, a radio and a referee around the unchanged pilot.
 ///
@@ -69,7 +69,7 @@ struct SweepArguments {
     /// The model [default: the built-in one].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
-    /// The engine that runs the model: tract or native.
+    /// Engine that runs the model: native, or tract in a build with that feature.
     #[arg(long, value_name = "ENGINE", default_value = "native")]
     engine: EngineKind,
     /// Print one JSON object instead of a table.
@@ -116,11 +116,14 @@ struct MissionArguments {
     /// cell that is farthest from the terminal within the battery.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["scenario", "devices"])]
     mission: Option<PathBuf>,
+    /// Rotation of the city's grid: direction of its north axis, degrees clockwise from true north, -180 to 180.
+    #[arg(long, value_name = "DEGREES", default_value = "0", allow_negative_numbers = true, value_parser = grid_rotation)]
+    grid_rotation: f32,
     /// The model [default: the built-in one].
     #[arg(long, value_name = "PATH")]
     model: Option<PathBuf>,
-    /// The engine that runs the model: tract or native.
-    #[arg(long, value_name = "ENGINE", default_value = "tract")]
+    /// Engine that runs the model: native, or tract in a build with that feature.
+    #[arg(long, value_name = "ENGINE", default_value = "native")]
     engine: EngineKind,
 }
 
@@ -243,6 +246,7 @@ impl MissionArguments {
             autopilot: self.autopilot_kind,
             energy,
             speedup,
+            rotation: Degrees(self.grid_rotation),
             ..MissionPlan::new(self.scenario, self.seed)
         };
         MissionOrder { plan, city: self.city.clone(), mission: self.mission.clone() }

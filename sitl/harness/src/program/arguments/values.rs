@@ -34,6 +34,10 @@ pub(super) fn units(text: &str) -> Result<f32, String> {
     number(text, 0.0..=500.0, "battery units are a number from 0 to 500")
 }
 
+pub(super) fn grid_rotation(text: &str) -> Result<f32, String> {
+    number(text, -180.0..=180.0, "a rotation is a number of degrees from -180 to 180")
+}
+
 pub(super) fn speed(text: &str) -> Result<f32, String> {
     number(text, 0.1..=50.0, "a speed is a factor from 0.1 to 50")
 }

@@ -14,8 +14,10 @@ pub(crate) fn suggest(text: &str, fault: EndpointFault) -> Option<String> {
     match fault {
         EndpointFault::Kind => suggest_kind(text, kind, rest),
         // "udpin:14550" lacks the host, "udpin:0.0.0.0" the port.
-        EndpointFault::Port if rest.parse::<u16>().is_ok_and(|port| port > 0) => {
-            kind.ends_with("in").then(|| format!("{kind}:0.0.0.0:{rest}"))
+        EndpointFault::Port if rest.parse::<u16>().is_ok() => {
+            let default = if kind.starts_with("tcp") { TCP_PORT } else { UDP_PORT };
+            let port = rest.parse().ok().filter(|&port| port > 0).unwrap_or(default);
+            kind.ends_with("in").then(|| format!("{kind}:0.0.0.0:{port}"))
         }
         EndpointFault::Port if !rest.contains(':') && !rest.is_empty() => {
             let port = if kind.starts_with("tcp") { TCP_PORT } else { UDP_PORT };

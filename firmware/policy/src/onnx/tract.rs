@@ -1,8 +1,9 @@
-//! tract as an engine.
+//! The tract engine.
 
-use super::pb::ModelProto;
-use super::{INPUTS, ModelError, ModelInfo, OUTPUTS, unseal};
-use crate::tokens::DEVICE_FEATURES;
+use super::error::{InferError, ModelError};
+use super::interface::{INPUTS, OUTPUTS};
+use super::metadata::{ModelInfo, unseal};
+use crate::schema::DEVICE_FEATURES;
 use crate::{Attention, Golden, Inference, K_MAX, LOCAL_MAP_CELLS, Policy, Tokens, self_test};
 use gleaner_units::Action;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,7 +11,7 @@ use std::sync::Arc;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::internal::{TypedSimpleState, format_err, tract_ndarray::ArrayD};
 
-/// A model that runs in tract, one observation at a time, on the calling thread.
+/// The tract engine with a model: one observation at a time, on the calling thread.
 pub struct TractPolicy {
     info: ModelInfo,
     goldens: Vec<Golden>,
@@ -19,29 +20,11 @@ pub struct TractPolicy {
     inputs: [Arc<Tensor>; INPUTS.len()],
 }
 
-/// Why there is no answer.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum InferError {
-    /// The local map is not complete.
-    #[error("the local map has {cells} cells, not {LOCAL_MAP_CELLS}")]
-    LocalMap {
-        /// How many it has.
-        cells: usize,
-    },
-    /// An output is infinite or not a number.
-    #[error("the model's answer is not finite")]
-    NotFinite,
-    /// tract gave up.
-    #[error("tract: {0}")]
-    Engine(String),
-}
-
 impl TractPolicy {
-    /// Reads the model, checks it and lets it prove itself on its golden pairs: the one way in for programs
-    /// that decide with it.
+    /// Reads and checks a model and runs the self-test. Programs that fly load models with this function.
     ///
     /// # Errors
-    /// Anything that makes the model unfit to fly, see [`ModelError`]. No bytes make it panic.
+    /// [`ModelError`] for a model that must not fly. Never panics.
     pub fn load_checked(bytes: &[u8]) -> Result<TractPolicy, ModelError> {
         let mut policy = TractPolicy::from_bytes(bytes)?;
         let goldens = std::mem::take(&mut policy.goldens);
@@ -51,25 +34,25 @@ impl TractPolicy {
         Ok(policy)
     }
 
-    /// As [`TractPolicy::load_checked`] without the self-test: for programs that measure how far an engine is
-    /// from its golden pairs. Do not fly with it.
+    /// As [`TractPolicy::load_checked`] without the self-test, to measure the difference to the golden pairs. Do not fly
+    /// with it.
     ///
     /// # Errors
     /// All but [`ModelError::SelfTest`].
     pub fn from_bytes(bytes: &[u8]) -> Result<TractPolicy, ModelError> {
-        let (model, info, goldens) = unseal(bytes)?;
-        let state = catch(|| build(&model).map_err(|cause| ModelError::Engine(one_line(&cause))))?;
+        let (_, info, goldens) = unseal(bytes)?;
+        let state = catch(|| build(bytes).map_err(|cause| ModelError::Engine(one_line(&cause))))?;
         let inputs = INPUTS.map(|port| Arc::new(zeros(port.shape)));
         Ok(TractPolicy { info, goldens, state, inputs })
     }
 
-    /// Who made the model, and its identity.
+    /// Origin and identity of the model.
     #[must_use]
     pub fn info(&self) -> &ModelInfo {
         &self.info
     }
 
-    /// What the model must answer.
+    /// The golden pairs.
     #[must_use]
     pub fn goldens(&self) -> &[Golden] {
         &self.goldens
@@ -108,13 +91,14 @@ impl Policy for TractPolicy {
     type Error = InferError;
 
     /// # Cost
-    /// About 0.6 million multiply-adds; tract allocates its intermediate tensors anew in each call.
+    /// About 0.7 million multiply-adds with any number of devices, because absent ones are computed too. tract allocates
+    /// its intermediate tensors in each call.
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, InferError> {
         if tokens.local_map.len() != LOCAL_MAP_CELLS {
             return Err(InferError::LocalMap { cells: tokens.local_map.len() });
         }
         let answer = self.run(tokens).map_err(|cause| {
-            // What a failed turn left behind must not reach the next one.
+            // State of the failed run must not reach the next one.
             let _ = self.state.reset_turn();
             InferError::Engine(one_line(&cause))
         })?;
@@ -127,9 +111,9 @@ impl Policy for TractPolicy {
     }
 }
 
-/// The graph with the batch fixed to one, optimised.
-fn build(model: &ModelProto) -> TractResult<TypedSimpleState> {
-    let mut graph = tract_onnx::onnx().model_for_proto_model(model)?;
+/// The optimised graph with a batch of one.
+fn build(mut bytes: &[u8]) -> TractResult<TypedSimpleState> {
+    let mut graph = tract_onnx::onnx().model_for_read(&mut bytes)?;
     graph.set_input_names(INPUTS.map(|port| port.name))?;
     graph.select_outputs_by_name(OUTPUTS.map(|port| port.name))?;
     for (index, port) in INPUTS.iter().enumerate() {
@@ -140,7 +124,7 @@ fn build(model: &ModelProto) -> TractResult<TypedSimpleState> {
         let fact = graph.output_fact(index)?;
         let shape = with_batch(port.shape);
         if fact.datum_type != f32::datum_type() || fact.shape.as_concrete() != Some(&shape[..]) {
-            return Err(format_err!("output `{}` comes out as {fact:?}", port.name));
+            return Err(format_err!("output `{}` has the type {fact:?}", port.name));
         }
     }
     graph.into_runnable()?.spawn()
@@ -154,13 +138,13 @@ fn zeros(shape: &[usize]) -> Tensor {
     ArrayD::<f32>::zeros(with_batch(shape)).into()
 }
 
-/// Writes into a tensor that is ours; copies it first if tract kept it.
+/// Overwrites a tensor; copies it first if tract still holds a reference.
 fn overwrite(tensor: &mut Arc<Tensor>, numbers: &[f32]) -> TractResult<()> {
     Arc::make_mut(tensor).try_as_plain_ram_mut()?.as_slice_mut::<f32>()?.copy_from_slice(numbers);
     Ok(())
 }
 
-/// tract panics on some graphs that no sane program writes; a file must not take its reader down.
+/// Turns a panic of tract, which some malformed graphs cause, into an error.
 fn catch<T>(work: impl FnOnce() -> Result<T, ModelError>) -> Result<T, ModelError> {
     catch_unwind(AssertUnwindSafe(work))
         .unwrap_or_else(|_| Err(ModelError::Engine("it panicked on the graph".into())))

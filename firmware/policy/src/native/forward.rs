@@ -1,21 +1,23 @@
-//! The forward pass.
+//! The forward pass of the portable engine.
 
 use super::attention::{KeyValue, Weights as HeadWeights, add_mean, attend, blocks};
-use super::blob::{Model, Weights};
 use super::kernel::multiply;
+use super::model::{Model, Weights};
 use super::network::{Encoder, Linear, Network, Stored};
 use super::rowwise::{add_and_norm, rectify};
-use super::{
+use super::shape::{
     BLOCKS, Block, FEED_FORWARD, HEAD_HIDDEN, HEAD_INPUTS, LANES, LOGIT_PANELS, PANEL, WIDTH, WIDTH_PANELS,
 };
-use crate::schema::{self, FEATURES, Normalisation};
-use crate::tokens::{DEVICE_FEATURES, UAV_FEATURES};
+use crate::schema::{
+    self, DEVICE_FEATURES, DEVICE_NORMALISATIONS, Normalisation, PREFERENCE_NORMALISATIONS,
+    UAV_NORMALISATIONS,
+};
 use crate::{Attention, FIRST_DEVICE_TOKEN, Inference, LOCAL_MAP_CELLS, Policy, TOKENS, Tokens};
 use core::array;
 use core::fmt;
 use gleaner_units::Action;
 
-/// Where the activations live: about 17 kB, made once, used for every inference.
+/// Memory for the activations, about 17 kB, reused by every inference.
 #[derive(Clone, Debug)]
 pub struct Workspace {
     tokens: [Block<WIDTH>; BLOCKS],
@@ -28,7 +30,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// One that can stand in a `static`.
+    /// An empty workspace; `const`, so that it can be a `static`.
     #[must_use]
     pub const fn new() -> Workspace {
         Workspace {
@@ -49,12 +51,12 @@ impl Default for Workspace {
     }
 }
 
-/// Why there is no answer.
+/// Why an inference failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NativeError {
-    /// The local map is not complete.
+    /// The local map is incomplete.
     LocalMap {
-        /// How many cells it has.
+        /// Its cells.
         cells: usize,
     },
     /// An output is infinite or not a number.
@@ -67,27 +69,27 @@ impl fmt::Display for NativeError {
             NativeError::LocalMap { cells } => {
                 write!(f, "the local map has {cells} cells, not {LOCAL_MAP_CELLS}")
             }
-            NativeError::NotFinite => write!(f, "the model's answer is not finite"),
+            NativeError::NotFinite => write!(f, "an output of the model is not finite"),
         }
     }
 }
 
 impl core::error::Error for NativeError {}
 
-/// A model that runs here, one observation at a time.
+/// The portable engine with a model: one observation at a time, the same bits on every machine.
 pub struct NativePolicy<'m> {
     model: Model<'m>,
     workspace: &'m mut Workspace,
 }
 
 impl<'m> NativePolicy<'m> {
-    /// The engine with a model in it. Let it prove itself with [`crate::self_test`] before it flies.
+    /// An engine for `model`. Run [`crate::self_test`] before flying with it.
     #[must_use]
     pub fn new(model: Model<'m>, workspace: &'m mut Workspace) -> NativePolicy<'m> {
         NativePolicy { model, workspace }
     }
 
-    /// The model in it.
+    /// The model.
     #[must_use]
     pub fn model(&self) -> &Model<'m> {
         &self.model
@@ -98,7 +100,7 @@ impl Policy for NativePolicy<'_> {
     type Error = NativeError;
 
     /// # Cost
-    /// About 0.66 million multiply-adds with six devices, 1.07 million with twelve; no allocation, no recursion.
+    /// About 0.66 million multiply-adds with six devices, 1.07 million with twelve. No allocation, no recursion.
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, NativeError> {
         let cells = tokens.local_map.len();
         let map = <[f32; LOCAL_MAP_CELLS]>::try_from(tokens.local_map.as_slice());
@@ -107,10 +109,10 @@ impl Policy for NativePolicy<'_> {
             Weights::F32(network) => self.workspace.run(network, tokens, &map),
             Weights::I16(network) => self.workspace.run(network, tokens, &map),
         };
-        let answer = Inference { logits, attention: self.workspace.attention.clone() };
-        let attention = answer.attention.0.as_flattened();
-        if answer.logits.iter().chain(attention).all(|number| number.is_finite()) {
-            Ok(answer)
+        let inference = Inference { logits, attention: self.workspace.attention.clone() };
+        let attention = inference.attention.0.as_flattened();
+        if inference.logits.iter().chain(attention).all(|number| number.is_finite()) {
+            Ok(inference)
         } else {
             Err(NativeError::NotFinite)
         }
@@ -144,7 +146,7 @@ impl Workspace {
     fn embed<W: Stored>(&mut self, network: &Network<'_, W>, tokens: &Tokens, map: &[f32; LOCAL_MAP_CELLS]) {
         let mut devices = [[0.0; DEVICE_FEATURES]; FIRST_DEVICE_TOKEN]
             .into_iter()
-            .chain(tokens.devices.iter().map(|device| normalise(device, &DEVICE)));
+            .chain(tokens.devices.iter().map(|device| normalise(device, &DEVICE_NORMALISATIONS)));
         let present = FIRST_DEVICE_TOKEN.saturating_add(tokens.devices.len());
         for block in self.tokens.iter_mut().take(blocks(present)) {
             let mut features = [[0.0; LANES]; DEVICE_FEATURES];
@@ -156,8 +158,12 @@ impl Workspace {
             multiply(&network.project_device, &features, block);
         }
         let [first, ..] = &mut self.tokens;
-        put(first, 0, project(&network.project_uav, &normalise(&tokens.uav, &UAV)));
-        put(first, 1, project(&network.project_preference, &normalise(&tokens.preference, &PREFERENCE)));
+        put(first, 0, project(&network.project_uav, &normalise(&tokens.uav, &UAV_NORMALISATIONS)));
+        put(
+            first,
+            1,
+            project(&network.project_preference, &normalise(&tokens.preference, &PREFERENCE_NORMALISATIONS)),
+        );
         put(first, 2, project(&network.project_map, &map.map(|units| schema::YIELD.apply(units))));
     }
 
@@ -183,8 +189,7 @@ impl Workspace {
         }
     }
 
-    /// What the head reads: aircraft, preference, map, and the largest of each device feature; zeros without
-    /// devices.
+    /// The head's inputs: aircraft, preference, map, and the maximum of each device feature (zero without devices).
     fn join(&self, present: usize) -> [[f32; 1]; HEAD_INPUTS] {
         let mut joined = [[0.0]; HEAD_INPUTS];
         let (parts, _) = joined.as_chunks_mut::<WIDTH>();
@@ -212,25 +217,8 @@ impl Workspace {
     }
 }
 
-/// The normalisations of the schema, in token order.
-const UAV: [Normalisation; UAV_FEATURES] = [
-    FEATURES[0].normalisation,
-    FEATURES[1].normalisation,
-    FEATURES[2].normalisation,
-    FEATURES[3].normalisation,
-];
-const DEVICE: [Normalisation; DEVICE_FEATURES] = [
-    FEATURES[4].normalisation,
-    FEATURES[5].normalisation,
-    FEATURES[6].normalisation,
-    FEATURES[7].normalisation,
-    FEATURES[8].normalisation,
-    FEATURES[9].normalisation,
-    FEATURES[10].normalisation,
-];
-const PREFERENCE: [Normalisation; 2] = [FEATURES[11].normalisation, FEATURES[12].normalisation];
-
-fn normalise<const N: usize>(numbers: &[f32; N], table: &[Normalisation; N]) -> [f32; N] {
+/// Applies the schema's normalisations to one token.
+pub(super) fn normalise<const N: usize>(numbers: &[f32; N], table: &[Normalisation; N]) -> [f32; N] {
     let mut normalised = [0.0; N];
     for ((normalised, number), row) in normalised.iter_mut().zip(numbers).zip(table) {
         *normalised = row.apply(*number);
@@ -248,7 +236,7 @@ fn project<W: Stored, const INPUTS: usize>(
     token.map(|[number]| number)
 }
 
-/// Writes a token into its lane.
+/// Writes a token to its lane.
 fn put<const N: usize>(block: &mut Block<N>, lane: usize, token: [f32; N]) {
     for (row, number) in block.iter_mut().zip(token) {
         if let Some(place) = row.get_mut(lane) {
@@ -262,16 +250,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tables_are_the_schema_s() {
-        let table = |tensor| schema::normalisations(tensor).collect::<std::vec::Vec<_>>();
-        assert_eq!(table("uav"), UAV);
-        assert_eq!(table("devices"), DEVICE);
-        assert_eq!(table("preference"), PREFERENCE);
-        assert_eq!(table("local_map"), [schema::YIELD]);
-    }
-
-    #[test]
-    fn the_workspace_fits_a_small_microcontroller() {
+    fn workspace_fits_a_small_microcontroller() {
         assert!(size_of::<Workspace>() <= 20 * 1024, "{} bytes", size_of::<Workspace>());
     }
 }

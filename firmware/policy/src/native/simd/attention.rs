@@ -1,0 +1,189 @@
+//! Multi-head attention of one observation on vector registers.
+#![expect(
+    clippy::indexing_slicing,
+    reason = "constant indices below constant lengths, in loops that must unroll"
+)]
+
+use super::QKV;
+use crate::native::shape::{HEAD_WIDTH, HEADS, WIDTH};
+use crate::{Attention, TOKENS};
+use core::array;
+use pulp::{Simd, WithSimd};
+
+/// Queries in one row of scores: [`TOKENS`] rounded up to whole registers. [`HEAD_WIDTH`] is the same number.
+const QUERIES: usize = TOKENS.next_multiple_of(HEAD_WIDTH);
+/// Keys, and rows of the result, that are computed together.
+const KEYS: usize = 4;
+
+const _: () = assert!(QUERIES == HEAD_WIDTH, "vectors of queries and of features have the same number");
+
+/// Memory that the attention reuses.
+pub(super) struct Scratch {
+    /// Queries by feature: `[WIDTH][QUERIES]`.
+    queries: [f32; WIDTH * QUERIES],
+    /// Scores, then weights, of one head: `[keys][queries]`.
+    scores: [f32; QUERIES * QUERIES],
+}
+
+impl Scratch {
+    pub const fn new() -> Scratch {
+        Scratch { queries: [0.0; WIDTH * QUERIES], scores: [0.0; QUERIES * QUERIES] }
+    }
+}
+
+/// `mixed = softmax(q k^T) v` for each head; the queries are already divided by the root of the head's width.
+///
+/// Softmax runs over the keys, which are rows of the scores, so no operation crosses the lanes of a register. Lanes
+/// beyond `tokens` hold arbitrary numbers that no result uses.
+pub(super) struct Attend<'a> {
+    /// Query, key and value of each token: `[tokens][QKV]`, or longer.
+    pub qkv: &'a [f32],
+    /// `[tokens][WIDTH]` and at least three rows more, which are overwritten.
+    pub mixed: &'a mut [f32],
+    pub tokens: usize,
+    pub scratch: &'a mut Scratch,
+    /// Receives the mean over the heads.
+    pub explain: Option<&'a mut Attention>,
+}
+
+impl WithSimd for Attend<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        match S::F32_LANES {
+            4 => self.run::<S, 4>(simd),
+            8 => self.run::<S, 2>(simd),
+            16 => self.run::<S, 1>(simd),
+            _ => {}
+        }
+    }
+}
+
+impl Attend<'_> {
+    /// `VECTORS` registers hold [`QUERIES`] numbers.
+    #[inline(always)]
+    fn run<S: Simd, const VECTORS: usize>(mut self, simd: S) {
+        let tokens = self.tokens.min(TOKENS);
+        for (token, row) in self.qkv.chunks_exact(QKV).take(tokens).enumerate() {
+            for (feature, number) in row[..WIDTH].iter().enumerate() {
+                self.scratch.queries[feature * QUERIES + token] = *number;
+            }
+        }
+        for head in 0..HEADS {
+            self.score::<S, VECTORS>(simd, tokens, head);
+            let (weights, _) = S::as_mut_simd_f32s(&mut self.scratch.scores);
+            softmax(simd, &mut weights.as_chunks_mut::<VECTORS>().0[..tokens]);
+            self.mix::<S, VECTORS>(simd, tokens, head);
+            self.explain(tokens);
+        }
+    }
+
+    #[inline(always)]
+    fn score<S: Simd, const VECTORS: usize>(&mut self, simd: S, tokens: usize, head: usize) {
+        let queries = &self.scratch.queries[head * HEAD_WIDTH * QUERIES..][..HEAD_WIDTH * QUERIES];
+        let (queries, _) = S::as_simd_f32s(queries);
+        let (queries, _) = queries.as_chunks::<VECTORS>();
+        let (scores, _) = S::as_mut_simd_f32s(&mut self.scratch.scores);
+        let (scores, _) = scores.as_chunks_mut::<VECTORS>();
+        for first in (0..tokens).step_by(KEYS) {
+            let keys: [&[f32]; KEYS] = array::from_fn(|key| {
+                &self.qkv[(first + key).min(tokens - 1) * QKV + WIDTH + head * HEAD_WIDTH..][..HEAD_WIDTH]
+            });
+            let mut sums = [[simd.splat_f32s(0.0); VECTORS]; KEYS];
+            for (feature, query) in queries.iter().enumerate() {
+                for key in 0..KEYS {
+                    let number = simd.splat_f32s(keys[key][feature]);
+                    for vector in 0..VECTORS {
+                        sums[key][vector] = simd.mul_add_e_f32s(query[vector], number, sums[key][vector]);
+                    }
+                }
+            }
+            scores[first..first + KEYS].copy_from_slice(&sums);
+        }
+    }
+
+    #[inline(always)]
+    fn mix<S: Simd, const VECTORS: usize>(&mut self, simd: S, tokens: usize, head: usize) {
+        for first in (0..tokens).step_by(KEYS) {
+            let mut sums = [[simd.splat_f32s(0.0); VECTORS]; KEYS];
+            let (weights, _) = self.scratch.scores.as_chunks::<QUERIES>();
+            for (row, weights) in self.qkv.chunks_exact(QKV).zip(weights).take(tokens) {
+                let (values, _) = S::as_simd_f32s(&row[2 * WIDTH + head * HEAD_WIDTH..][..HEAD_WIDTH]);
+                for query in 0..KEYS {
+                    let weight = simd.splat_f32s(weights[first + query]);
+                    for vector in 0..VECTORS {
+                        sums[query][vector] =
+                            simd.mul_add_e_f32s(values[vector], weight, sums[query][vector]);
+                    }
+                }
+            }
+            for (query, sums) in sums.iter().enumerate() {
+                let place = &mut self.mixed[(first + query) * WIDTH + head * HEAD_WIDTH..][..HEAD_WIDTH];
+                S::as_mut_simd_f32s(place).0.copy_from_slice(sums);
+            }
+        }
+    }
+
+    /// Adds one head's weights to the mean over the heads.
+    fn explain(&mut self, tokens: usize) {
+        let Some(attention) = self.explain.as_deref_mut() else { return };
+        let (weights, _) = self.scratch.scores.as_chunks::<QUERIES>();
+        for (query, row) in attention.0.iter_mut().enumerate().take(tokens) {
+            for (mean, weights) in row.iter_mut().zip(weights).take(tokens) {
+                *mean += weights[query] * (1.0 / HEADS as f32);
+            }
+        }
+    }
+}
+
+/// Softmax over the rows, in place.
+#[inline(always)]
+fn softmax<S: Simd, const VECTORS: usize>(simd: S, rows: &mut [[S::f32s; VECTORS]]) {
+    let mut largest = [simd.splat_f32s(f32::MIN); VECTORS];
+    for row in rows.iter() {
+        for vector in 0..VECTORS {
+            largest[vector] = simd.max_f32s(largest[vector], row[vector]);
+        }
+    }
+    let mut sums = [simd.splat_f32s(0.0); VECTORS];
+    for row in rows.iter_mut() {
+        for vector in 0..VECTORS {
+            row[vector] = exp(simd, simd.sub_f32s(row[vector], largest[vector]));
+            sums[vector] = simd.add_f32s(sums[vector], row[vector]);
+        }
+    }
+    let inverse = sums.map(|sum| simd.div_f32s(simd.splat_f32s(1.0), sum));
+    for row in rows.iter_mut() {
+        for vector in 0..VECTORS {
+            row[vector] = simd.mul_f32s(row[vector], inverse[vector]);
+        }
+    }
+}
+
+/// `e^x` for x <= 0, within two units in the last place; below -87 the result is `e^-87`.
+///
+/// Cody and Waite's reduction to `2^n e^r` with `|r| <= ln 2 / 2`, and the polynomial of Cephes' `expf`.
+#[inline(always)]
+fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    // 1.5 x 2^23: the sum's low bits are x / ln 2 rounded to a whole number.
+    const ROUND: f32 = 12_582_912.0;
+    const LN_2_HIGH: f32 = 0.693_359_4;
+    const LN_2_LOW: f32 = -2.121_944_4e-4;
+    const POLYNOMIAL: [f32; 5] = [1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 5.000_000_1e-1];
+    let splat = |number: f32| simd.splat_f32s(number);
+    // In this order NaN stays NaN.
+    let x = simd.max_f32s(splat(-87.0), x);
+    let shifted = simd.mul_add_e_f32s(x, splat(core::f32::consts::LOG2_E), splat(ROUND));
+    let n = simd.sub_f32s(shifted, splat(ROUND));
+    let r = simd.mul_add_e_f32s(n, splat(-LN_2_HIGH), x);
+    let r = simd.mul_add_e_f32s(n, splat(-LN_2_LOW), r);
+    let mut sum = splat(1.987_569_1e-4);
+    for coefficient in POLYNOMIAL {
+        sum = simd.mul_add_e_f32s(sum, r, splat(coefficient));
+    }
+    let sum = simd.mul_add_e_f32s(sum, simd.mul_f32s(r, r), simd.add_f32s(r, splat(1.0)));
+    let exponent = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(23));
+    let scale = simd.add_u32s(exponent, simd.splat_u32s(1.0_f32.to_bits()));
+    simd.mul_f32s(sum, simd.transmute_f32s_u32s(scale))
+}

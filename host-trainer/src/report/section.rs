@@ -1,0 +1,7 @@
+//! The frame that every section of the page shares.
+
+use maud::{Markup, html};
+
+pub(super) fn section(id: &str, title: &str, body: Markup) -> Markup {
+    html! { section id=(id) { h2 { (title) } (body) } }
+}
