@@ -157,11 +157,13 @@ fn capabilities() -> MavProtocolCapability {
 
 /// The package's version as major, minor, patch and type 255 (`FIRMWARE_VERSION_TYPE_OFFICIAL`), one byte each.
 fn software_version() -> u32 {
-    let mut bytes = [0, 0, 0, 255];
-    for (byte, part) in bytes.iter_mut().zip(env!("CARGO_PKG_VERSION").split('.').take(3)) {
-        *byte = part.parse().unwrap_or(0);
-    }
-    u32::from_be_bytes(bytes)
+    let part = |text: &str| text.parse().unwrap_or(0);
+    u32::from_be_bytes([
+        part(env!("CARGO_PKG_VERSION_MAJOR")),
+        part(env!("CARGO_PKG_VERSION_MINOR")),
+        part(env!("CARGO_PKG_VERSION_PATCH")),
+        255,
+    ])
 }
 
 impl From<SystemState> for MavState {

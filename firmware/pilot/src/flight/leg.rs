@@ -81,7 +81,8 @@ impl Leg {
 
     /// The fraction of the way that was covered since the last call.
     pub(crate) fn cover(&mut self, position: &Ned) -> f32 {
-        let covered = self.along(position).clamp(self.covered, 1.0);
+        // `clamp` would have to panic on a low above a high.
+        let covered = self.along(position).min(1.0).max(self.covered);
         covered - core::mem::replace(&mut self.covered, covered)
     }
 
