@@ -87,9 +87,9 @@ pub struct Replay {
     /// The trained policy [default: the built-in one].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// Engine that runs the model: native, or tract in a build with that feature.
-    #[arg(long, value_name = "ENGINE", default_value = "native")]
-    pub engine: EngineKind,
+    /// Engine that runs the model: native or tract [default: native, or tract for another graph].
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Option<EngineKind>,
 }
 
 /// A model to time.
@@ -135,7 +135,7 @@ pub struct Setup {
     /// The trained policy [default: the built-in one].
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// Engine that runs the model: native, or tract in a build with that feature.
+    /// Engine that runs the model: native or tract [default: native, or tract for another graph].
     #[arg(long, value_name = "ENGINE")]
     pub engine: Option<EngineKind>,
     /// The mission.

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
     let kinds = EngineKind::ALL.into_iter().filter(|kind| kind.is_built());
     let mut engines =
-        kinds.map(|kind| load::model(order.model.as_deref(), kind)).collect::<Result<Vec<_>, _>>()?;
+        kinds.map(|kind| load::model(order.model.as_deref(), Some(kind))).collect::<Result<Vec<_>, _>>()?;
     let mut goldens: Vec<Golden> = Vec::new();
     for golden in engines.iter().flat_map(Engine::goldens) {
         if goldens.iter().all(|other| other.tokens.devices.len() != golden.tokens.devices.len()) {

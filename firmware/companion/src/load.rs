@@ -13,14 +13,19 @@ pub const SHIPPED: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/
 /// What messages call the built-in model.
 const SHIPPED_NAME: &str = "built-in";
 
-/// The model file, or the built-in model, after it reproduced its golden pairs.
+/// The model file, or the built-in model, after it reproduced its golden pairs. Without a choice of engine the native one
+/// runs it, or tract where the graph is not the one that the native engine knows.
 ///
 /// # Errors
 /// The file cannot be read, or is no model that may fly.
-pub fn model(path: Option<&Path>, engine: EngineKind) -> Result<Engine, StartError> {
+pub fn model(path: Option<&Path>, engine: Option<EngineKind>) -> Result<Engine, StartError> {
     let bytes = model_bytes(path)?;
-    Engine::load_checked(&bytes, engine)
-        .map_err(|source| StartError::Model { path: model_name(path), source })
+    let load = |kind| Engine::load_checked(&bytes, kind);
+    let loaded = match engine {
+        Some(kind) => load(kind),
+        None => load(EngineKind::Native).or_else(|_| load(EngineKind::Tract)),
+    };
+    loaded.map_err(|source| StartError::Model { path: model_name(path), source })
 }
 
 /// The bytes of the model file, or of the built-in model.

@@ -27,7 +27,7 @@ pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
     println!(
         "{}, engine {} ({})",
         engine.name(),
-        order.engine.name(),
+        engine.kind().name(),
         load::model_name(order.model.as_deref()).display()
     );
     let mut comparison = Comparison { engine, findings: Findings::default() };

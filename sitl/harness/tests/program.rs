@@ -27,7 +27,7 @@ fn errors_are_one_line_and_exit_code_2() {
         (&["fly", "--preference", "1.5"], "a weight is a number from 0 to 1"),
         (&["fly", "--switch", "soon:0.5"], "the time is a number of seconds"),
         (&["hover"], "unrecognized subcommand 'hover'"),
-        (&["serve", "--gcs", "tcp:1:2"], "is not an endpoint"),
+        (&["serve", "--gcs", "pigeon:1:2"], "is not an endpoint"),
         (&["serve", "--battery", "450"], "ask for 400 at most"),
     ];
     for (words, cause) in cases {

@@ -57,8 +57,8 @@ pub enum RadioFormat {
 pub struct Config {
     /// The model file; without one the built-in model.
     pub model: Option<PathBuf>,
-    /// What runs the model.
-    pub engine: EngineKind,
+    /// What runs the model; `None` leaves the choice to the model.
+    pub engine: Option<EngineKind>,
     /// The mission file.
     pub mission: PathBuf,
     /// Port to the autopilot.
@@ -184,7 +184,7 @@ fn merge(
         telemetry_log: file.log.telemetry,
         signing: source.signing(&file, folder)?,
         model: path(&setup.model, &file.model),
-        engine: setup.engine.or(engine).unwrap_or_default(),
+        engine: setup.engine.or(engine),
         mission: path(&setup.mission, &file.mission).ok_or(missing("mission", "mission.toml"))?,
         autopilot: setup
             .autopilot

@@ -13,7 +13,7 @@ use crate::message::SystemState;
 use crate::message::{Message, MessageFault, Severity};
 use crate::operators::Operators;
 use crate::parameters::{ParameterError, ParameterId, Parameters};
-use crate::service::autopilot::{Autopilot, is_autopilot};
+use crate::service::autopilot::{Autopilot, is_autopilot, mode_of};
 use crate::service::commands::Answers;
 use crate::service::identity::Identity;
 use crate::service::parameters::ParameterService;
@@ -307,7 +307,10 @@ impl Component {
             count(&mut self.stats.for_others);
             return;
         }
-        if self.identity.serves(sender.system) {
+        // A late frame may show another mode; it does not show that ours still holds.
+        let outdated = matches!(message, Message::Heartbeat(heartbeat)
+            if frame.late && mode_of(heartbeat).companion_may_steer());
+        if self.identity.serves(sender.system) && !outdated {
             self.take_from_vehicle(now, sender, message);
         }
         self.answer(now, sender, message);

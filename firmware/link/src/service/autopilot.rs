@@ -89,12 +89,7 @@ impl Autopilot {
     /// Its mode, `None` while not connected.
     #[must_use]
     pub fn mode(&self) -> Option<FlightMode> {
-        let (heartbeat, _) = self.heartbeat.filter(|_| self.connected)?;
-        Some(FlightMode::from_custom_mode(
-            Firmware::from_wire(heartbeat.autopilot),
-            heartbeat.vehicle,
-            heartbeat.custom_mode,
-        ))
+        self.heartbeat.filter(|_| self.connected).map(|(heartbeat, _)| mode_of(&heartbeat))
     }
 
     /// Whether it is connected and in a mode in which position targets are obeyed.
@@ -354,4 +349,13 @@ pub(crate) fn is_autopilot(heartbeat: &Heartbeat) -> bool {
     const NO_AUTOPILOT: u8 = 8;
     heartbeat.autopilot != NO_AUTOPILOT
         && matches!(heartbeat.vehicle, 1..=4 | 7..=17 | 19..=25 | 28 | 29 | 35 | 43 | 45..=47)
+}
+
+/// The flight mode that a heartbeat shows.
+pub(crate) const fn mode_of(heartbeat: &Heartbeat) -> FlightMode {
+    FlightMode::from_custom_mode(
+        Firmware::from_wire(heartbeat.autopilot),
+        heartbeat.vehicle,
+        heartbeat.custom_mode,
+    )
 }

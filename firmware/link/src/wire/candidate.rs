@@ -153,6 +153,7 @@ impl Header {
             compatibility: self.compatibility,
             checksum,
             signature,
+            late: false,
             payload: Vec::from_slice(payload).unwrap_or_default(),
         };
         Candidate::Frame(frame, length)

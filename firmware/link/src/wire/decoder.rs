@@ -43,6 +43,8 @@ pub struct FrameDecoder {
     buffer: [u8; CAPACITY],
     start: usize,
     end: usize,
+    /// Where the newest bytes begin.
+    newest: usize,
     /// Bytes of a skipped frame that have not arrived yet.
     to_skip: usize,
     /// Whether the next byte is where a frame must begin.
@@ -64,6 +66,7 @@ impl FrameDecoder {
             buffer: [0; CAPACITY],
             start: 0,
             end: 0,
+            newest: 0,
             to_skip: 0,
             in_order: false,
             stats: DecodeStats {
@@ -82,7 +85,7 @@ impl FrameDecoder {
     pub fn begin_datagram(&mut self) {
         let left = self.end.saturating_sub(self.start);
         self.stats.garbage_bytes = self.stats.garbage_bytes.saturating_add(left as u32);
-        (self.start, self.end, self.to_skip, self.in_order) = (0, 0, 0, true);
+        (self.start, self.end, self.newest, self.to_skip, self.in_order) = (0, 0, 0, 0, true);
     }
 
     /// Takes in bytes and returns how many. Less than all when the buffer is full; after
@@ -99,6 +102,7 @@ impl FrameDecoder {
         for (slot, byte) in room.iter_mut().zip(bytes) {
             *slot = *byte;
         }
+        self.newest = self.end;
         self.end += taken;
         skipped + taken
     }
@@ -119,8 +123,9 @@ impl FrameDecoder {
                         return None;
                     }
                 }
-                Candidate::Frame(frame, length) => {
+                Candidate::Frame(mut frame, length) => {
                     self.start += length;
+                    frame.late = self.start <= self.newest;
                     self.in_order = true;
                     count(&mut self.stats.frames);
                     if frame.signature.is_some() {

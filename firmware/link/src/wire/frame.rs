@@ -43,6 +43,9 @@ pub struct Frame {
     pub checksum: u16,
     /// Signature, if the frame carries one. The decoder does not verify it; see [`crate::Signing`].
     pub signature: Option<[u8; SIGNATURE_BYTES]>,
+    /// Whether the frame was complete before the newest bytes arrived: it waited behind a damaged frame, and its age is
+    /// unknown. It is no evidence of what holds now.
+    pub late: bool,
     pub(crate) payload: Vec<u8, MAX_PAYLOAD_BYTES>,
 }
 

@@ -24,10 +24,32 @@ fn decode_chunked(wire: &[u8], chunk: usize) -> (Vec<Frame>, FrameDecoder) {
             let taken = decoder.push(bytes);
             assert!(taken > 0, "a drained decoder takes bytes");
             bytes = &bytes[taken..];
-            found.extend(std::iter::from_fn(|| decoder.next_frame()));
+            // When a frame was found is another question than which frames were found.
+            while let Some(mut frame) = decoder.next_frame() {
+                frame.late = false;
+                found.push(frame);
+            }
         }
     }
     (found, decoder)
+}
+
+/// A damaged header claims 200 bytes of payload: the heartbeats behind it wait until its end has arrived. Only those that
+/// were complete before are late.
+#[test]
+fn a_frame_that_waited_behind_a_damaged_one_is_late() {
+    let heartbeat = golden("heartbeat_copter_guided");
+    let mut damaged = golden("battery_status");
+    damaged.truncate(10);
+    damaged[1] = 200;
+    let mut decoder = FrameDecoder::new();
+    let early = [damaged.as_slice(), &heartbeat].concat();
+    assert_eq!(decoder.push(&early), early.len());
+    assert!(decoder.next_frame().is_none(), "the damaged frame may still be whole");
+    let rest = heartbeat.repeat(12);
+    assert_eq!(decoder.push(&rest), rest.len());
+    let late: Vec<bool> = std::iter::from_fn(|| decoder.next_frame()).map(|frame| frame.late).collect();
+    assert_eq!((late[0], late[1]), (true, false), "{late:?}");
 }
 
 /// Noise with many magic bytes, small lengths and ids of known messages.

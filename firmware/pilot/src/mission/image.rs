@@ -7,7 +7,7 @@
 //! | 4 | `GLNM` |
 //! | 2 | version, [`VERSION`] |
 //! | 2 | length of the body |
-//! | 4 | CRC-32 (ISO-HDLC) of the body |
+//! | 4 | CRC-32 (ISO-HDLC) of the version and the body (in version 2 of the body) |
 //! | body | grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); rotation, degrees clockwise from north (f32; not in version 2); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (4 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
 //!
 //! Whatever follows the body is ignored, so the image may stand in a longer section of flash.
@@ -104,7 +104,7 @@ pub fn encode(mission: &Mission) -> ImageBytes {
         &MAGIC,
         &VERSION.to_le_bytes(),
         &(body.len() as u16).to_le_bytes(),
-        &CRC.checksum(&body).to_le_bytes(),
+        &checksum(VERSION, &body).to_le_bytes(),
     ];
     for part in header.into_iter().chain([body.as_slice()]) {
         let _ = image.extend_from_slice(part);
@@ -126,12 +126,22 @@ pub fn decode(bytes: &[u8]) -> Result<Mission, ImageError> {
         return Err(ImageError::Version(version));
     }
     let length = usize::from(header.u16()?);
-    let checksum = u32::from_le_bytes(header.array()?);
+    let stored = u32::from_le_bytes(header.array()?);
     let body = header.slice(length)?;
-    if CRC.checksum(body) != checksum {
+    if checksum(version, body) != stored {
         return Err(ImageError::Checksum);
     }
     Reader(body).mission(version)
+}
+
+/// Covers the version too: with one bit of it flipped, a body would be read in another layout.
+fn checksum(version: u16, body: &[u8]) -> u32 {
+    let mut digest = CRC.digest();
+    if version != UNROTATED {
+        digest.update(&version.to_le_bytes());
+    }
+    digest.update(body);
+    digest.finalize()
 }
 
 /// The bytes not yet read.

@@ -131,10 +131,7 @@ fn the_city_is_asked_for_by_its_path_and_its_faults_are_passed_on() {
     let missing = read(TEXT, |_| Err("no such file".into())).unwrap_err();
     assert_eq!(missing.to_string(), "line 8: heights \"city.csv\": no such file");
     let wrong = read(TEXT, |_| Ok("1,x\n".into())).unwrap_err();
-    assert_eq!(
-        wrong.to_string(),
-        "heights \"city.csv\", line 1, value 2: not a whole number of metres from 0 to 255"
-    );
+    assert_eq!(wrong.to_string(), "heights \"city.csv\", line 1, column 2: \"x\" is no height in metres");
 }
 
 #[test]
