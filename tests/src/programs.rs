@@ -10,9 +10,10 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 /// When it is not built, with the command to type.
 #[must_use]
 pub fn path(name: &str) -> PathBuf {
-    // Tests are in the `deps` folder beside the programs.
-    let test = std::env::current_exe().expect("a test knows where it is");
-    let folder = test.parent().and_then(|deps| deps.parent()).expect("tests are two folders deep");
+    // Tests are in the `deps` folder beside the programs; a program of this package is beside them.
+    let own = std::env::current_exe().expect("a program knows where it is");
+    let folder =
+        own.ancestors().skip(1).find(|folder| !folder.ends_with("deps")).expect("a program is in a folder");
     let program = folder.join(name);
     assert!(
         program.exists(),

@@ -110,7 +110,7 @@ impl Dashboard {
         self.client.receive(frame);
         if let Ok(Some(Message::StatusText { severity, text, .. })) = Message::decode(frame) {
             let text = String::from_utf8_lossy(&text).into_owned();
-            self.server.publish(Event::Text(Text { t_s: self.now_s, severity: severity as u8, text }));
+            self.server.publish(Event::Text(Text { t_s: self.now_s, severity, text }));
         } else if frame.message_id == NAMED_VALUE_FLOAT_DATA::ID
             && let Ok(value) = NAMED_VALUE_FLOAT_DATA::deser(MavlinkVersion::V2, frame.payload())
         {
@@ -134,12 +134,7 @@ pub fn scene(mission: &Mission, title: String, incidents: Vec<String>) -> Scene 
     let fence: Vec<bool> = cells().map(|cell| mission.fence.contains(cell)).collect();
     Scene {
         title,
-        grid: Grid {
-            width: grid.width().into(),
-            height: grid.height().into(),
-            cell_m: grid.cell().0,
-            rotation_deg: 0.0,
-        },
+        grid: Grid { width: grid.width(), height: grid.height(), cell_m: grid.cell().0, rotation_deg: 0.0 },
         heights_m: cells().map(|cell| mission.heights.height_m(cell).unwrap_or(0)).collect(),
         fence: fence.contains(&false).then_some(fence),
         terminal: [mission.terminal.x, mission.terminal.y],

@@ -76,6 +76,7 @@ impl<const D: usize> Links<D> {
     }
 
     /// All devices with whether they see the cell with this index.
+    #[expect(clippy::wrong_self_convention, reason = "the links from this cell, not a conversion")]
     pub(crate) fn from_cell(&self, index: usize) -> impl Iterator<Item = (Cell, bool)> {
         let (place, bit) = (index / 32, index % 32);
         self.devices

@@ -60,9 +60,8 @@ impl RadioFaults {
             RadioFault::LyingFull => reports.iter_mut().for_each(|r| r.remaining = Some(3e38)),
             RadioFault::LyingStrong => reports.iter_mut().for_each(|r| r.snr = Db(40.0)),
             RadioFault::Unknown(count) => {
-                if let Some(first) = reports.first().cloned() {
-                    reports
-                        .extend((0..count).map(|n| Report { device: 500 + u32::from(n), ..first.clone() }));
+                if let Some(first) = reports.first().copied() {
+                    reports.extend((0..count).map(|n| Report { device: 500 + u32::from(n), ..first }));
                 }
             }
         }

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// `std::fs::read_to_string("city.csv")`. The city has the size of the scenario's map, 40 x 30 cells of 20 m.
 fn heights() -> String {
     let row = |y: usize| {
-        let height = |x: usize| if x % 5 == 2 && y % 4 != 0 { "30" } else { "0" };
+        let height = |x: usize| if x % 5 == 2 && !y.is_multiple_of(4) { "30" } else { "0" };
         (0..40).map(height).collect::<Vec<_>>().join(",")
     };
     (0..30).map(row).collect::<Vec<_>>().join("\n")

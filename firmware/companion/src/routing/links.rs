@@ -114,7 +114,7 @@ impl Links {
 
     /// One line of counters for each port.
     pub fn summary(&self) -> impl Iterator<Item = String> {
-        self.links.iter().map(|link| describe(link))
+        self.links.iter().map(describe)
     }
 
     /// Stores what must outlive the run.

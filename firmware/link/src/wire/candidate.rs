@@ -22,6 +22,7 @@ pub enum Rejected {
 }
 
 /// Verdict on the bytes from the first one on.
+#[expect(clippy::large_enum_variant, reason = "there is no heap to box a frame on")]
 pub enum Candidate {
     /// More bytes are needed.
     Incomplete,

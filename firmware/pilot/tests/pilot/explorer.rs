@@ -9,8 +9,11 @@ use gleaner_pilot::{Outputs, Request, State};
 use gleaner_units::{Duration, Instant};
 use std::collections::HashMap;
 
+/// An event and what it does to the rig.
+type Act = (&'static str, fn(&mut Rig));
+
 /// What may happen, each followed by one second of polls.
-const EVENTS: [(&str, fn(&mut Rig)); 16] = [
+const EVENTS: [Act; 16] = [
     ("nothing", |_| {}),
     ("engage", |rig| rig.request = Some(Request::Engage)),
     ("off", |rig| rig.request = Some(Request::Off)),

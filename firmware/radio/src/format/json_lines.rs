@@ -45,7 +45,8 @@ impl Id {
 impl Line {
     fn report(&self, calibration: Calibration) -> Option<Report> {
         let device = [&self.id, &self.dev_addr, &self.dev_eui].into_iter().flatten().next()?.number()?;
-        let age_ms = (self.age_s.is_finite() && self.age_s >= 0.0).then(|| (self.age_s * 1e3) as u32)?;
+        let known = self.age_s.is_finite() && self.age_s >= 0.0;
+        let age_ms = known.then_some((self.age_s * 1e3) as u32)?;
         Some(Report { device, snr: calibration.apply(Db(self.snr_db)), remaining: self.remaining, age_ms })
     }
 }

@@ -36,7 +36,8 @@ pub(super) fn serve(order: &ServeOrder) -> Result<bool, ProgramError> {
     server.report(order, finished, begun)
 }
 
-/// Where the pilot runs.
+/// Where the pilot runs. There is one of it in a process.
+#[expect(clippy::large_enum_variant, reason = "one value in a process")]
 enum Pilot {
     /// In this process, on the aircraft's clock.
     Inside(Box<Onboard<Engine>>, PolicyInfo),

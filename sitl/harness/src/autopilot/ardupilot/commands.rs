@@ -172,7 +172,7 @@ impl ArduCopter {
 
     fn take_off(&mut self, height_m: f32) -> MavResult {
         let possible = self.mode == VehicleMode::Guided && self.armed && self.airframe.on_ground;
-        if self.airframe.home.is_none() || !possible || !(height_m > 0.0) {
+        if self.airframe.home.is_none() || !possible || height_m.is_nan() || height_m <= 0.0 {
             return MAV_RESULT_FAILED;
         }
         let [north, east, _] = self.airframe.body.position;
