@@ -75,9 +75,9 @@ impl std::fmt::Debug for Token {
 /// The rule of one server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Everybody on this computer may look and command: only for a loopback address.
+    /// Every program on this computer may look and command. For a loopback address only.
     Loopback,
-    /// Whoever shows `view` may look, whoever shows `control` may look and command.
+    /// The token `view` gives the right to look; the token `control` gives the rights to look and to command.
     Tokens {
         /// To look.
         view: Token,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!            engage request            first decision
-//!   Nobody ------------------> Asked ------------------> Pilot
+//!   Unclaimed ---------------> Asked ------------------> Pilot
 //!     ^                          ^                         | another mode delivered, restart,
 //!     |                          |  engage request         v another station's targets in force
 //!     +-- (boot)                 +---------------------- Other
@@ -24,7 +24,7 @@ use mavlink::dialects::ardupilotmega::{
 /// Who may move the aircraft, as far as the pilot can know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Holder {
-    Nobody,
+    Unclaimed,
     Asked(Instant),
     Pilot,
     Other,
@@ -73,7 +73,7 @@ impl Custody {
             kind,
             system_id,
             component_id,
-            holder: Holder::Nobody,
+            holder: Holder::Unclaimed,
             evidence_at: None,
             evidence_after: Instant::ZERO,
             own_request: None,
@@ -175,7 +175,7 @@ impl Custody {
                 (now - at > self.scaled(REQUEST_AGE_S)).then_some(Rule::RequestExpired)
             }
             Holder::Pilot => None,
-            Holder::Nobody => Some(Rule::NeverAsked),
+            Holder::Unclaimed => Some(Rule::NeverAsked),
             Holder::Other => Some(Rule::TookItBack),
         }
     }
@@ -200,7 +200,7 @@ impl Custody {
             return self.target_sent(now);
         }
         match self.holder {
-            Holder::Nobody | Holder::Asked(_) => return Some(Rule::NeverAsked),
+            Holder::Unclaimed | Holder::Asked(_) => return Some(Rule::NeverAsked),
             Holder::Other => return Some(Rule::CommandAfterTakeOver),
             Holder::Pilot => {}
         }
@@ -227,7 +227,7 @@ impl Custody {
             }
             // On ArduPilot the first target follows the decision in the same poll.
             Holder::Asked(_) => None,
-            Holder::Nobody => Some(Rule::NeverAsked),
+            Holder::Unclaimed => Some(Rule::NeverAsked),
             Holder::Other => Some(Rule::TargetAfterTakeOver),
         }
     }
