@@ -16,7 +16,7 @@
 //! | module | contents | uses |
 //! |---|---|---|
 //! | [`net`] | networks: forward and backward passes, Adam | - |
-//! | [`env`] | missions and flights | - |
+//! | [`mod@env`] | missions and flights | - |
 //! | [`settings`] | hyper-parameters and presets | `env` |
 //! | [`observe`] | encodings | `net`, `env` |
 //! | [`keep`] | checkpoints, snapshots, learning curves | `settings` |

@@ -122,8 +122,8 @@ pub struct Setup {
     /// Configuration file; paths in it are relative to it.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Port to the autopilot: udpin:HOST:PORT, udpout:HOST:PORT, udpbcast:HOST:PORT, tcpin:HOST:PORT, tcpout:HOST:PORT or
-    /// serial:PATH[:BAUD].
+    /// Port to the autopilot: udpin:HOST:PORT, udpout:HOST:PORT, udpbcast:HOST:PORT, tcpin:HOST:PORT, tcpout:HOST:PORT,
+    /// serial:PATH or serial:PATH:BAUD.
     #[arg(long, value_name = "ENDPOINT")]
     pub autopilot: Option<Endpoint>,
     /// Another port, to a ground station; may be given several times. Messages are routed between the ports.

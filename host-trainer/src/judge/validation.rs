@@ -22,7 +22,7 @@ const WASTE_PRICE: f64 = 100.0;
 pub struct Tables(pub Vec<(String, Table)>);
 
 impl Tables {
-    /// What the best parameters are chosen by: the mean hypervolume over the scenarios, less [`WASTE_PRICE`] for every
+    /// What the best parameters are chosen by: the mean hypervolume over the scenarios, less `WASTE_PRICE` for every
     /// battery unit that is wasted at w = (0, 1). Hypervolume hardly sees those, but whoever asks for energy alone must
     /// get the shortest mission.
     #[must_use]

@@ -61,7 +61,7 @@ impl Preset {
         result
     }
 
-    /// Updates between two validations, [`PAPER_EVALUATION_STEPS`] apart.
+    /// Updates between two validations, `PAPER_EVALUATION_STEPS` apart.
     #[must_use]
     pub fn validate_every(self, settings: &Settings) -> u64 {
         (PAPER_EVALUATION_STEPS / (settings.steps_per_update.max(1) as u64)).max(1)

@@ -5,13 +5,13 @@
 //!
 //! - **Reward.** The return of a mission depends more on its devices than on any one decision. The planner, which has
 //!   full knowledge, therefore estimates the state value in every slot, and the reward is shaped by its change
-//!   (potential-based shaping: Ng, Harada and Russell 1999). See [`advantage`].
+//!   (potential-based shaping: Ng, Harada and Russell 1999). See `advantage`.
 //! - **Advantage.** A critic with the policy's observation learns the expected sum of the shaped rewards; advantages are
 //!   generalised estimates (Schulman et al. 2016), normalised by preference.
 //! - **Unlikelihood.** A policy gradient vanishes where the policy is certain. Policies therefore kept ending missions by
-//!   flying over the terminal. A move that ends a mission at a loss is made less likely directly. See [`loss`].
+//!   flying over the terminal. A move that ends a mission at a loss is made less likely directly. See `loss`.
 //! - **Prompts.** For the same reason a certain policy does not explore another device order. The planner sometimes flies
-//!   for some slots, and the policy imitates them if they went better than the critic expected. See [`prompt`].
+//!   for some slots, and the policy imitates them if they went better than the critic expected. See `prompt`.
 //! - **Views.** Every mission is observed in one of the eight views, turned or mirrored, so that no direction is special.
 
 mod advantage;
