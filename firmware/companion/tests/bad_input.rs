@@ -110,7 +110,7 @@ fn missions() {
             "city.csv",
             "33",
             "cheese",
-            &["mission.toml: heights \"city.csv\", line 2, value 2: not a whole number"],
+            &["mission.toml: heights \"city.csv\", line 2, column 2: \"cheese\" is no height in metres"],
         ),
     ];
     for (file, from, to, parts) in cases {

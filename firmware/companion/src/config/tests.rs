@@ -28,7 +28,7 @@ fn fault(text: &str) -> String {
 fn paths_are_relative_to_the_file_and_flags_go_first() {
     let config = merged(&Setup::default(), TEXT).unwrap();
     assert_eq!(config.model.as_deref(), Some(Path::new("/etc/gleaner/policy.onnx")));
-    assert_eq!(config.engine, Some(EngineKind::Native));
+    assert_eq!(config.engine, None);
     assert_eq!(config.mission, Path::new("/etc/gleaner/missions/city.toml"));
     assert_eq!(config.log_dir.as_deref(), Some(Path::new("/var/log/gleaner")));
     assert_eq!(config.settings, Settings { system_id: Some(7), component_id: 192, ..Settings::default() });
