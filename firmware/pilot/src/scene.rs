@@ -2,6 +2,7 @@
 
 use crate::{Inputs, Mission, Vehicle};
 use gleaner_guard::Guard;
+use gleaner_link::Autopilot;
 use gleaner_policy::Preference;
 use gleaner_units::{Cell, Duration, GridFrame, Instant};
 
@@ -29,11 +30,13 @@ impl<'a> Scene<'a> {
         at.is_some_and(|at| self.evidence_from.is_none_or(|from| at > from))
     }
 
-    /// Whether a heartbeat that arrived after `reason` shows that the aircraft is ours: armed and in GUIDED or OFFBOARD.
-    /// Nothing that moves the aircraft is requested without it.
+    /// Whether a fresh heartbeat that arrived after `reason` shows that the aircraft is ours: armed and in GUIDED or
+    /// OFFBOARD. Nothing that moves the aircraft is requested without it. The heartbeat's age counts too: a request may
+    /// wait for something else after the heartbeat came, such as a position.
     pub(crate) fn is_ours_since(&self, reason: Instant) -> bool {
         let vehicle = self.vehicle();
-        let heard_since = vehicle.heartbeat_at.is_some_and(|at| at > reason);
+        let is_fresh = |at: Instant| at > reason && self.now.since(at) <= Autopilot::EVIDENCE_AGE;
+        let heard_since = vehicle.heartbeat_at.is_some_and(is_fresh);
         heard_since && self.hears() && vehicle.armed && vehicle.is_guided() && !self.inputs.other_mode_seen
     }
 

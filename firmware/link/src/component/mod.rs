@@ -152,7 +152,7 @@ impl Component {
         self.autopilot.poll(now, wants_rc, &mut self.outgoing, &mut self.events);
         match self.autopilot.address().filter(|_| self.autopilot.is_connected()) {
             Some(address) => {
-                let ours_at = self.autopilot.ours_at();
+                let ours_at = self.autopilot.ours_at(now);
                 self.requests.poll(now, address, ours_at, &mut self.outgoing, &mut self.events);
             }
             None => self.requests.abandon(&mut self.events),

@@ -58,6 +58,9 @@ const PX4_READY: u16 = 0x0037;
 impl Autopilot {
     /// Lost after five missed heartbeats.
     const LOST: Duration = Duration::from_secs(5);
+    /// A command that moves the aircraft needs a heartbeat that is not older than this. Autopilots send one a second;
+    /// the rest is for delays on the line.
+    pub const EVIDENCE_AGE: Duration = Duration::from_millis(1_500);
     /// A clock that is behind by more than this restarted; less is messages out of order.
     const CLOCK_SLACK_MS: u32 = 1_000;
 
@@ -111,10 +114,11 @@ impl Autopilot {
     }
 
     /// When a heartbeat last showed that the aircraft is ours: armed and in a mode in which position targets are
-    /// obeyed. `None` as soon as a heartbeat shows otherwise.
+    /// obeyed. `None` as soon as a heartbeat shows otherwise, and when it is older than [`Autopilot::EVIDENCE_AGE`].
     #[must_use]
-    pub fn ours_at(&self) -> Option<Instant> {
-        self.heartbeat_at().filter(|_| self.is_armed() && self.companion_may_steer())
+    pub fn ours_at(&self, now: Instant) -> Option<Instant> {
+        let fresh = self.heartbeat_at().filter(|&at| now.since(at) <= Autopilot::EVIDENCE_AGE);
+        fresh.filter(|_| self.is_armed() && self.companion_may_steer())
     }
 
     /// Whether a heartbeat since the last call showed a mode in which we do not steer, even if a later one does not.

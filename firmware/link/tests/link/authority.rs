@@ -40,6 +40,20 @@ fn a_repetition_needs_a_newer_heartbeat_in_our_mode() {
 }
 
 #[test]
+fn a_request_needs_a_fresh_heartbeat() {
+    let mut bench = Bench::connected();
+    bench.hear_packet(VEHICLE, &heartbeat(GUIDED, true, 4));
+    bench.run(1_600);
+    let now = bench.now();
+    bench.component.request(now, AutopilotCommand::ReturnToLaunch).unwrap();
+    bench.run(500);
+    assert_eq!(returns(&mut bench), 0, "the last heartbeat is older than EVIDENCE_AGE");
+    bench.hear_packet(VEHICLE, &heartbeat(GUIDED, true, 4));
+    bench.run(50);
+    assert_eq!(returns(&mut bench), 1);
+}
+
+#[test]
 fn a_request_without_evidence_ends_unanswered() {
     let mut bench = Bench::connected();
     let now = bench.now();

@@ -29,6 +29,26 @@ fn a_return_needs_a_heartbeat_after_the_fault() {
 }
 
 #[test]
+fn a_return_that_waited_for_a_position_needs_a_new_heartbeat() {
+    let mut rig = Rig::engaged();
+    rig.run(1.0);
+    let position = rig.vehicle.position.take();
+    rig.vehicle.mode = None;
+    rig.run(10.0);
+    // One heartbeat, and no position: whether the aircraft was moved meanwhile is unknown.
+    rig.vehicle.mode = Some(FlightMode::Guided);
+    rig.step();
+    rig.beats = false;
+    rig.run(1.6);
+    rig.vehicle.position = position;
+    rig.run(3.0);
+    assert_eq!(rig.commanded(RETURN), 0, "the heartbeat is older than EVIDENCE_AGE");
+    rig.beats = true;
+    rig.run(0.1);
+    assert_eq!(rig.commanded(RETURN), 1);
+}
+
+#[test]
 fn a_pilot_who_took_over_behind_a_cut_downlink_is_left_alone() {
     let mut rig = downlink_cut();
     rig.run(2.0);
