@@ -2,7 +2,7 @@
 
 use crate::config;
 use crate::error::StartError;
-use gleaner_link::{PARAMETERS, Parameters};
+use gleaner_link::PARAMETERS;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -11,14 +11,18 @@ use std::process::ExitCode;
 /// # Errors
 /// The configuration cannot be read, or a value in it is out of range.
 pub fn params(config: Option<&Path>) -> Result<ExitCode, StartError> {
-    let parameters = config.map_or_else(|| Ok(Parameters::default()), config::parameters)?;
+    let defaults = config::default_parameters();
+    let parameters = config.map_or_else(|| Ok(defaults.clone()), config::parameters)?;
     println!("{:<13} {:>6} {:>8}  {:<9} {:<6} meaning", "parameter", "value", "default", "range", "unit");
     for spec in PARAMETERS {
         let value = parameters.value(spec.id);
         let range = format!("{}..{}", spec.min, spec.max);
         println!(
             "{:<13} {value:>6} {:>8}  {range:<9} {:<6} {}",
-            spec.name, spec.default, spec.unit, spec.doc
+            spec.name,
+            defaults.value(spec.id),
+            spec.unit,
+            spec.doc
         );
     }
     Ok(ExitCode::SUCCESS)

@@ -1,12 +1,13 @@
 //! `gleaner replay`: makes the decisions of a log again and lists those that change.
 //!
-//! A log holds the input and the answer of the model and the actions that the guard allowed. It may come from
+//! A log holds the input and the answer of the model and the actions that the guard allowed, and with look-ahead what that
+//! was given. The look-ahead keeps a plan, so its decisions are made again from the first one of a mission on. It may come from
 //! `gleaner run` or from a simulator.
 
 use crate::args::Replay;
 use crate::error::StartError;
 use crate::load;
-use gleaner_pilot::LoggedDecision;
+use gleaner_pilot::{LoggedDecision, LookAheadReplay, Replayed};
 use gleaner_policy::{Engine, Policy};
 use gleaner_units::Action;
 use std::fs::File;
@@ -30,7 +31,8 @@ pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
         engine.kind().name(),
         load::model_name(order.model.as_deref()).display()
     );
-    let mut comparison = Comparison { engine, findings: Findings::default() };
+    let (lookahead, findings) = (LookAheadReplay::default(), Findings::default());
+    let mut comparison = Comparison { engine, lookahead, findings };
     for (index, line) in log.split(b'\n').enumerate() {
         let line = line.map_err(unreadable)?;
         match serde_json::from_slice(&line) {
@@ -42,13 +44,16 @@ pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
         }
     }
     let Findings { counts, furthest } = comparison.findings;
-    let [equal, different, guards, skipped] = counts;
-    if equal + different + guards == 0 {
+    let [equal, different, guards, skipped, incomplete] = counts;
+    if equal + different + guards + incomplete == 0 {
         return Err(StartError::NoDecisions { path: order.log.clone() });
     }
     println!("decisions equal             {equal}");
     println!("decisions different         {different}");
     println!("by the guard, not replayed  {guards}");
+    if incomplete > 0 {
+        println!("plan begins before the log  {incomplete}");
+    }
     println!("lines skipped               {skipped}");
     println!("largest logit difference    {furthest:.1e}");
     // A log without a decision of the model proves nothing.
@@ -62,12 +67,14 @@ enum Kind {
     Different,
     Guards,
     Skipped,
+    /// The look-ahead's plan is older than the log.
+    Incomplete,
 }
 
 #[derive(Default)]
 struct Findings {
     /// By [`Kind`].
-    counts: [u64; 4],
+    counts: [u64; 5],
     furthest: f32,
 }
 
@@ -86,6 +93,7 @@ impl Findings {
 
 struct Comparison {
     engine: Engine,
+    lookahead: LookAheadReplay,
     findings: Findings,
 }
 
@@ -106,7 +114,20 @@ impl Comparison {
         let difference = |(then, now): (&f32, &f32)| (then - now).abs();
         let furthest = logits.iter().zip(&answer.logits).map(difference).fold(0.0, f32::max);
         self.findings.furthest = self.findings.furthest.max(furthest);
-        match logged.mask.argmax(&answer.logits) {
+        let decided = match &logged.lookahead {
+            None => logged.mask.argmax(&answer.logits),
+            Some(entry) => match self.lookahead.decide(logged, entry, &answer.logits) {
+                Replayed::Choice(action, record) if record == entry.record => Some(action),
+                Replayed::Choice(action, _) => {
+                    let now = action.name();
+                    let how =
+                        || differs(format!("logged {was}, now {now}, and the look-ahead's figures differ"));
+                    return self.findings.note(Kind::Different, how);
+                }
+                Replayed::Incomplete => return self.findings.note(Kind::Incomplete, String::new),
+            },
+        };
+        match decided {
             Some(action) if action == logged.action => self.findings.note(Kind::Equal, String::new),
             decided => self.findings.note(Kind::Different, || {
                 let now = decided.map_or("nothing", Action::name);

@@ -5,8 +5,7 @@ use crate::{
 };
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{InputPin, OutputPin, PinState};
-use gleaner_pilot::{Onboard, Parameters, State};
-use gleaner_policy::Policy;
+use gleaner_pilot::{Deliberator, Onboard, Parameters, State};
 use gleaner_units::Instant;
 
 /// A board. Its clocks run and its UARTs are open before it is handed over; the UARTs themselves are behind
@@ -70,7 +69,7 @@ impl<B: Board> Services<B> {
 
     /// Feeds the watchdog, passes the inhibit input to the pilot, shows its state, and saves changed parameters.
     /// Returns whether the pilot commands the aircraft.
-    pub fn poll<P: Policy>(&mut self, now: Instant, onboard: &mut Onboard<P>) -> bool {
+    pub fn poll<P: Deliberator>(&mut self, now: Instant, onboard: &mut Onboard<P>) -> bool {
         B::feed_watchdog();
         let state = onboard.state();
         onboard.set_engage_inhibited(self.panel.poll(now, state));

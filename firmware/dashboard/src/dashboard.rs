@@ -6,9 +6,9 @@ use crate::order::Order;
 use crate::server::Server;
 use crate::words::{mode, owner, reason};
 use gleaner_link::{Address, Frame, FrameDecoder, Message};
-use gleaner_pilot::{Mission, Onboard, Vehicle};
+use gleaner_pilot::{Deliberator, Mission, Onboard, Source, Vehicle};
+use gleaner_policy::FIRST_DEVICE_TOKEN;
 use gleaner_policy::schema::REACHABLE_SNR_DB;
-use gleaner_policy::{FIRST_DEVICE_TOKEN, Policy};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, GridFrame, Instant};
 use mavlink::dialects::ardupilotmega::NAMED_VALUE_FLOAT_DATA;
 use mavlink::{MavlinkVersion, MessageData as _};
@@ -59,7 +59,7 @@ impl Dashboard {
 
     /// Publishes what is due, and takes orders. Returns frames of the page's ground station for the pilot: hand them to
     /// [`Onboard::receive_link`].
-    pub fn poll<P: Policy>(
+    pub fn poll<P: Deliberator>(
         &mut self,
         wall: time::Instant,
         now: Instant,
@@ -149,7 +149,7 @@ pub fn scene(mission: &Mission, title: String, incidents: Vec<String>) -> Scene 
     }
 }
 
-fn live<P: Policy>(t_s: f64, now: Instant, onboard: &Onboard<P>, telemetry: Telemetry) -> Live {
+fn live<P: Deliberator>(t_s: f64, now: Instant, onboard: &Onboard<P>, telemetry: Telemetry) -> Live {
     let machine = onboard.machine();
     let mission = machine.mission();
     let vehicle = Vehicle::observe(now, onboard.link().autopilot());
@@ -205,7 +205,20 @@ pub fn shown(decision: &gleaner_pilot::Decision) -> Decision {
             rows.map(|row| row.iter().take(tokens).copied().collect()).collect()
         }),
         slots: decision.slots.to_vec(),
-        source: Some(if inference.is_some() { "the network" } else { "the guard" }.into()),
+        source: Some(source(decision).into()),
+    }
+}
+
+/// What chose the action.
+fn source(decision: &gleaner_pilot::Decision) -> &'static str {
+    if decision.inference.is_none() {
+        return "the guard";
+    }
+    match decision.lookahead.map_or(Source::Network, |record| record.source) {
+        Source::Network => "the network",
+        Source::KeptPlan => "the kept plan",
+        Source::DeviceOrder => "a new order of devices",
+        Source::SingleMove => "a single move, then the plan",
     }
 }
 

@@ -65,6 +65,18 @@ pub struct ChannelFit {
     reports: f32,
 }
 
+/// What a [`ChannelFit`] has found: the deviation from the nominal channel, obstructed links first, then links with line of
+/// sight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ChannelEstimate {
+    /// Change of the gain at 100 m, dB.
+    pub gain_db: [f32; 2],
+    /// Change of the path-loss exponent.
+    pub exponent: [f32; 2],
+    /// Standard deviation of the residuals beyond the nominal shadowing, dB.
+    pub excess_db: f32,
+}
+
 /// A report's prediction under one link condition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Prediction {
@@ -144,6 +156,17 @@ impl ChannelFit {
     #[must_use]
     pub fn excess_db(&self) -> f32 {
         libm::sqrtf(self.excess_db2)
+    }
+
+    /// The fit without its uncertainty, for logs and telemetry.
+    #[must_use]
+    pub fn estimate(&self) -> ChannelEstimate {
+        let [obstructed_gain, obstructed_exponent, gain, exponent] = self.mean;
+        ChannelEstimate {
+            gain_db: [obstructed_gain, gain],
+            exponent: [obstructed_exponent, exponent],
+            excess_db: self.excess_db(),
+        }
     }
 
     /// Whether the model explains what is received.

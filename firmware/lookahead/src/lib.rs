@@ -44,7 +44,7 @@ mod what_if;
 
 pub use channel::{ChannelModel, PathLoss};
 pub use decide::{Budget, Choice, Expected, LookAhead, Source, View, W_DATA_MAX};
-pub use fit::{ChannelFit, FitSettings};
+pub use fit::{ChannelEstimate, ChannelFit, FitSettings};
 pub use links::Links;
 pub use model::{EMPTY_UNITS, Model, Onboard, Transmission};
 pub use rates::Rates;

@@ -130,6 +130,9 @@ pub struct Telemetry {
     pub unit_pct: f32,
     /// Battery percent expected at touchdown if the mission went home now; negative when it does not suffice.
     pub land_pct: Option<f32>,
+    /// Gain of links with line of sight at 100 m compared to the nominal channel, dB, as estimated in this mission; `None`
+    /// without look-ahead.
+    pub snr_off: Option<f32>,
 }
 
 /// What the machine sends.

@@ -12,6 +12,8 @@
 //! - **shadow**: decides and logs as if engaged, commands nothing.
 //! - **guided**: the autopilot follows our targets: GUIDED on ArduPilot, OFFBOARD on PX4. The machine never requests
 //!   that mode and never arms; both are the operator's.
+//! - **look-ahead**: a search over tours in the on-board model that chooses the action in place of the network, see
+//!   [`LookingAhead`] and `GLN_LOOKAHEAD`. A board without it decides by the network alone.
 //! - **evidence**: a heartbeat in our mode, armed, that arrived after the reason for a request. See
 //!   [`Fault`].
 //! - **leg**: the flight to one cell centre, or the hover over it for one slot.
@@ -24,7 +26,7 @@
 //! onboard/   bytes in, bytes out                 uses machine, link, radio
 //! machine/   dispatch and transitions            uses states
 //! states/    waiting, flying, landing, ...       use decide, flight
-//! decide/    one decision                        uses policy, guard
+//! decide/    one decision                        uses policy, guard, lookahead
 //! flight/    plan, leg, energy, stream, watches
 //! mission/   mission, file, image
 //! ```
@@ -59,9 +61,13 @@ mod state;
 mod states;
 mod vehicle;
 
-pub use decide::{Decision, DecisionRecord, RECORD_BYTES_MAX};
+pub use decide::{
+    Decision, DecisionRecord, Deliberator, LookAheadRecord, LookingAhead, Place, RECORD_BYTES_MAX,
+};
 #[cfg(feature = "std")]
-pub use decide::{LoggedDecision, SimulatedSlot};
+pub use decide::{
+    LoggedDecision, LoggedDevice, LoggedLookAhead, LoggedMission, LookAheadReplay, Replayed, SimulatedSlot,
+};
 pub use exchange::{Devices, Inputs, Notice, Outputs, RadioActivity, Request, Rules, Telemetry};
 pub use machine::Machine;
 #[cfg(feature = "std")]
@@ -76,5 +82,6 @@ pub use vehicle::Vehicle;
 /// Time between polls by the programs. The pilot needs 20 Hz or more.
 pub const POLL_INTERVAL: gleaner_units::Duration = gleaner_units::Duration::from_millis(20);
 
-// The link owns these nouns; they are part of the pilot's interface.
+// The link and the look-ahead own these nouns; they are part of the pilot's interface.
 pub use gleaner_link::{AutopilotCommand, Enable, ParameterError, ParameterId, Parameters, Severity};
+pub use gleaner_lookahead::{Budget, ChannelEstimate, Expected, Source};

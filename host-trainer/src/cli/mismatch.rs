@@ -58,7 +58,7 @@ fn share(text: &str) -> Result<f64, String> {
 impl MismatchArguments {
     /// Whether the channel is the nominal one. What the policy knows does not concern the oracle.
     pub fn channel_is_nominal(&self) -> bool {
-        self.noise == 0.0 && self.exponent == 0.0 && !self.fading
+        self.mismatch().channel_is_nominal()
     }
 
     /// The mismatch.

@@ -1,5 +1,6 @@
 //! The command line: one file per command.
 
+mod compare;
 mod distil;
 mod evaluate;
 mod export;
@@ -42,6 +43,9 @@ enum Command {
     Refine(Box<refine::Arguments>),
     /// Print the paper's metrics of a model, a run and GREEDY.
     Evaluate(Box<evaluate::Arguments>),
+    /// Compare a model with and without look-ahead, GREEDY and the oracle where channel, map or reports differ from what
+    /// the aircraft assumes; with 95 % confidence intervals.
+    Compare(compare::Arguments),
     /// Compute what a planner with full knowledge of map, channel and devices reaches.
     Oracle(oracle::Arguments),
     /// Write the best parameters of a run as an ONNX model with its card.
@@ -62,6 +66,7 @@ pub fn run() -> Result<()> {
         Command::Distil(arguments) => distil::run(arguments),
         Command::Refine(arguments) => refine::run(arguments),
         Command::Evaluate(arguments) => evaluate::run(arguments),
+        Command::Compare(arguments) => compare::run(arguments),
         Command::Oracle(arguments) => oracle::run(arguments),
         Command::Export(arguments) => export::run(arguments),
         Command::Report(arguments) => report::run(arguments),

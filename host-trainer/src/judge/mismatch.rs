@@ -39,6 +39,12 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
+    /// Whether the channel is the nominal one; map and reports may still be wrong.
+    #[must_use]
+    pub fn channel_is_nominal(&self) -> bool {
+        self.noise_db == 0.0 && self.exponent == 0.0 && self.fading == Fading::None
+    }
+
     /// The world that is flown in.
     #[must_use]
     pub fn world(&self, city: City) -> World {

@@ -1,7 +1,9 @@
 //! Measures systems: the metrics, settings and analyses of the paper.
 
+pub mod comparison;
 pub mod evaluation;
 pub mod explanation;
+pub mod interval;
 pub mod lookahead;
 pub mod mismatch;
 pub mod paper;

@@ -2,10 +2,13 @@
 
 use crate::script::ComputerFault;
 use crate::simulation::Simulation;
-use gleaner_pilot::{Mission, Onboard, OnboardError, Parameters, Settings, State};
-use gleaner_policy::{Inference, Policy, SelfTestError, Tokens};
+use gleaner_pilot::{
+    ChannelEstimate, Deliberator, LookAheadRecord, Mission, Onboard, OnboardError, ParameterId, Parameters,
+    Place, Settings, State,
+};
+use gleaner_policy::{DeviceState, Inference, SelfTestError, Tokens};
 use gleaner_radio::encode;
-use gleaner_units::Instant;
+use gleaner_units::{Action, ActionMask, Instant, Sight};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -19,7 +22,7 @@ pub trait Companion {
 }
 
 /// On the pilot's clock and in this process.
-impl<P: Policy> Companion for Onboard<P> {
+impl<P: Deliberator> Companion for Onboard<P> {
     fn exchange(&mut self, simulation: &mut Simulation, now: Instant) {
         for frame in simulation.to_companion() {
             simulation.delivered(now, &frame);
@@ -32,7 +35,7 @@ impl<P: Policy> Companion for Onboard<P> {
     }
 }
 
-fn turn<P: Policy>(onboard: &mut Onboard<P>, simulation: &mut Simulation, now: Instant) {
+fn turn<P: Deliberator>(onboard: &mut Onboard<P>, simulation: &mut Simulation, now: Instant) {
     onboard.poll(now);
     let mut buffer = [0; 512];
     loop {
@@ -47,12 +50,39 @@ fn turn<P: Policy>(onboard: &mut Onboard<P>, simulation: &mut Simulation, now: I
 /// A policy that outlives the pilots that use it.
 struct Shared<P>(Rc<RefCell<P>>);
 
-impl<P: Policy> Policy for Shared<P> {
-    type Error = P::Error;
+impl<P: Deliberator> Deliberator for Shared<P> {
+    const LOOKS_AHEAD: bool = P::LOOKS_AHEAD;
 
-    fn infer(&mut self, tokens: &Tokens) -> Result<Inference, P::Error> {
+    fn infer(&mut self, tokens: &Tokens) -> Option<Inference> {
         self.0.borrow_mut().infer(tokens)
     }
+
+    fn begin(&mut self, sight: Option<&dyn Sight>, devices: impl Iterator<Item = DeviceState>, seed: u32) {
+        self.0.borrow_mut().begin(sight, devices, seed);
+    }
+
+    fn propose(
+        &mut self,
+        place: &Place<'_>,
+        devices: impl Iterator<Item = DeviceState>,
+        logits: &[f32; Action::COUNT],
+        mask: ActionMask,
+        is_on: bool,
+    ) -> Option<(Action, LookAheadRecord)> {
+        self.0.borrow_mut().propose(place, devices, logits, mask, is_on)
+    }
+
+    fn channel(&self) -> Option<ChannelEstimate> {
+        self.0.borrow().channel()
+    }
+}
+
+/// The parameters of a fresh installation on a computer with an operating system.
+pub(crate) fn parameters(looks_ahead: bool) -> Parameters {
+    let mut parameters = Parameters::default();
+    // 0 and 1 are in the parameter's range.
+    let _ = parameters.set_id(ParameterId::Lookahead, if looks_ahead { 1.0 } else { 0.0 });
+    parameters
 }
 
 /// Most bytes that wait for a program that does not read: Linux's default socket buffer.
@@ -74,7 +104,7 @@ pub struct Computer<P> {
     waiting_bytes: usize,
 }
 
-impl<P: Policy> Computer<P> {
+impl<P: Deliberator> Computer<P> {
     /// A computer whose program has just started.
     ///
     /// # Errors
@@ -91,7 +121,7 @@ impl<P: Policy> Computer<P> {
             policy: Rc::new(RefCell::new(policy)),
             self_test,
             onboard: None,
-            parameters: Parameters::default(),
+            parameters: parameters(P::LOOKS_AHEAD),
             stalled_until: Instant::ZERO,
             starts_at: Instant::ZERO,
             waiting: Vec::new(),
@@ -124,7 +154,7 @@ impl<P: Policy> Computer<P> {
     }
 }
 
-impl<P: Policy> Companion for Computer<P> {
+impl<P: Deliberator> Companion for Computer<P> {
     fn exchange(&mut self, simulation: &mut Simulation, now: Instant) {
         if self.onboard.is_none() && now >= self.starts_at {
             // The mission was accepted at the first start.

@@ -7,8 +7,8 @@ use crate::referee::Violation;
 use crate::script::{FlightScript, IncidentKind};
 use crate::setup::{MissionSetup, PlanError};
 use crate::simulation::Simulation;
-use gleaner_pilot::{OnboardError, Settings, State};
-use gleaner_policy::{Policy, SelfTestError};
+use gleaner_pilot::{Deliberator, OnboardError, Settings, State};
+use gleaner_policy::SelfTestError;
 use gleaner_units::{BatteryUnits, Duration, Instant};
 use gleaner_world::ScenarioKind;
 use thiserror::Error;
@@ -216,13 +216,14 @@ impl FlightRun {
 }
 
 /// Flies a mission from boot to landing, in virtual time. `self_test` is the result of the policy's self-test.
+/// `GLN_LOOKAHEAD` starts at 1 if the policy looks ahead.
 ///
 /// # Errors
 /// See [`FlightError`]. A flight that goes wrong is no error: see [`FlightResult::figures`].
 ///
 /// # Cost
 /// A few thousand polls per minute of flight, under a millisecond of work each second; one inference per decision.
-pub fn fly<P: Policy>(
+pub fn fly<P: Deliberator>(
     setup: MissionSetup,
     script: FlightScript,
     policy: P,

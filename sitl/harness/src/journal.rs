@@ -1,9 +1,10 @@
 //! The record of a flight: track, slots, frames, and their files.
 
 use crate::autopilot::Truth;
-use gleaner_pilot::{DecisionRecord, LoggedDecision, Mission, SimulatedSlot};
+use crate::setup::MissionSetup;
+use gleaner_pilot::{DecisionRecord, LoggedDecision, LoggedLookAhead, Mission, SimulatedSlot};
 use gleaner_policy::{DeviceState, Preference, Situation, Slots, Tokens};
-use gleaner_units::{Duration, Instant, Ned, Rays};
+use gleaner_units::{Duration, Instant, Metres, Ned, Rays};
 use gleaner_world::{City, Serving};
 use std::io::{self, Write};
 
@@ -42,6 +43,15 @@ impl Slot {
             sight: &sight,
         };
         Some(Tokens::build(&situation, self.heard.iter().copied()))
+    }
+}
+
+impl Slot {
+    /// The look-ahead's part of the log.
+    fn lookahead(&self, setup: &MissionSetup) -> Option<LoggedLookAhead> {
+        let settings = (Metres(setup.altitude_m()), setup.plan.reserve);
+        let record = self.record.lookahead?;
+        Some(LoggedLookAhead::new(record, &setup.mission, settings, self.heard.iter().copied()))
     }
 }
 
@@ -114,17 +124,19 @@ impl Journal {
         Ok(())
     }
 
-    /// Writes one JSON object per decision, as `gleaner run` does: `gleaner replay` reads both. The model's input is
-    /// built again from the records and `mission`; a record with an impossible preference has none and is left out.
+    /// Writes one JSON object per decision, as `gleaner run` does: `gleaner replay` reads both. The inputs of model and
+    /// look-ahead are built again from the records and `setup`; a record with an impossible preference has none and is
+    /// left out.
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn write_decisions(&self, mission: &Mission, out: &mut impl Write) -> io::Result<()> {
+    pub fn write_decisions(&self, setup: &MissionSetup, out: &mut impl Write) -> io::Result<()> {
         for slot in &self.slots {
-            let Some((tokens, slots)) = slot.observation(mission) else { continue };
+            let Some((tokens, slots)) = slot.observation(&setup.mission) else { continue };
             let line = LoggedDecision {
                 time_us: slot.at.as_micros(),
                 position_ned_m: Some([slot.position.north_m, slot.position.east_m, slot.position.down_m]),
+                lookahead: slot.lookahead(setup),
                 truth: Some(SimulatedSlot {
                     served: slot.serving.map(|serving| serving.device),
                     served_units: slot.serving.map_or(0.0, |serving| serving.collected_units),

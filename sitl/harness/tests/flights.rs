@@ -4,7 +4,7 @@ use gleaner_harness::{
     AircraftFault, AutopilotKind, Ending, FlightResult, FlightScript, Incident, IncidentKind, LineFault,
     MissionPlan, MissionSetup, RadioFault, Switch, VehicleMode, fly, trajectory,
 };
-use gleaner_pilot::State;
+use gleaner_pilot::{Budget, Deliberator, LoggedDecision, LookAheadReplay, LookingAhead, Replayed, State};
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
 use gleaner_units::{Action, BatteryUnits, Duration};
 use gleaner_world::{Episode, ScenarioKind, World};
@@ -53,7 +53,7 @@ fn world() -> Arc<World> {
     Arc::new(World::default_world())
 }
 
-fn flown<P: Policy>(plan: MissionPlan, script: FlightScript, policy: P) -> FlightResult {
+fn flown<P: Deliberator>(plan: MissionPlan, script: FlightScript, policy: P) -> FlightResult {
     fly(MissionSetup::new(world(), plan).unwrap(), script, policy, Ok(())).unwrap()
 }
 
@@ -304,11 +304,7 @@ fn the_same_seed_gives_the_same_bytes() {
         let flown = flown(plan, FlightScript { switches, ..FlightScript::plain(0.9) }, Waiter);
         let (mut tlog, mut decisions) = (Vec::new(), Vec::new());
         flown.simulation.journal().write_tlog(&mut tlog).unwrap();
-        flown
-            .simulation
-            .journal()
-            .write_decisions(&flown.simulation.setup().mission, &mut decisions)
-            .unwrap();
+        flown.simulation.journal().write_decisions(flown.simulation.setup(), &mut decisions).unwrap();
         (tlog, decisions)
     };
     let (first, second) = (files(), files());
@@ -333,4 +329,30 @@ fn a_take_over_on_px4_is_respected() {
     let result = flown(plan, FlightScript { incidents, ..FlightScript::plain(0.0) }, Homeward);
     assert_eq!(result.figures().violations, [], "{:?}", texts(&result));
     assert_eq!((result.ending, result.state), (Ending::TakenOver, Some(State::Passive)));
+}
+
+/// A waiter with look-ahead, from boot to landing; and every decision again from the log.
+#[test]
+fn a_flight_with_lookahead_lands_and_its_log_replays() {
+    let plan = MissionPlan { devices: Some(3), battery: Some(BatteryUnits(60.0)), ..rd(6) };
+    let script = || FlightScript {
+        switches: vec![Switch { after: Duration::from_secs(60), w_data: 0.4 }],
+        ..FlightScript::plain(0.9)
+    };
+    let alone = flown(plan, script(), Waiter).figures();
+    let result = flown(plan, script(), LookingAhead::new(Waiter, Budget { tours: 60 }));
+    let figures = result.figures();
+    assert!(figures.is_good(), "{:?} {:?} {}", figures.violations, texts(&result), result.waiting_for);
+    assert!(figures.collected > alone.collected + 0.2, "{} and {}", figures.collected, alone.collected);
+    let mut log = Vec::new();
+    result.simulation.journal().write_decisions(result.simulation.setup(), &mut log).unwrap();
+    let (mut replay, mut count) = (LookAheadReplay::default(), 0);
+    for line in log.split(|&byte| byte == b'\n').filter(|line| !line.is_empty()) {
+        let logged: LoggedDecision = serde_json::from_slice(line).unwrap();
+        let (Some(logits), Some(entry)) = (logged.logits, &logged.lookahead) else { continue };
+        let again = replay.decide(&logged, entry, &logits);
+        assert_eq!(again, Replayed::Choice(logged.action, entry.record), "decision {}", logged.sequence);
+        count += 1;
+    }
+    assert!(count > 20, "{count}");
 }

@@ -191,7 +191,7 @@ impl Source<'_> {
     }
 
     pub fn parameters(&self, values: &BTreeMap<String, Spanned<f64>>) -> Result<Parameters, ConfigError> {
-        let mut parameters = Parameters::default();
+        let mut parameters = super::default_parameters();
         for (name, value) in values {
             let at = |what| self.fault(value.span().start, format!("{name} = {}: {what}", value.get_ref()));
             if name == "GLN_ENABLE" {

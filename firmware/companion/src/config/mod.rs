@@ -33,7 +33,7 @@ use crate::args::Setup;
 use crate::logs::Limits;
 use crate::text::{self, TextFault};
 use file::Source;
-use gleaner_link::Parameters;
+use gleaner_link::{ParameterId, Parameters};
 use gleaner_pilot::Settings;
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
@@ -143,6 +143,15 @@ pub fn resolve(setup: &Setup) -> Result<Config, ConfigError> {
     let text = setup.config.as_deref().map(read).transpose()?.unwrap_or_default();
     let path = setup.config.as_deref().unwrap_or(Path::new(""));
     merge(setup, &Source { path, text: &text }, |name| env::var_os(name).map(PathBuf::from))
+}
+
+/// The parameters of a computer with an operating system: look-ahead is on.
+#[must_use]
+pub fn default_parameters() -> Parameters {
+    let mut parameters = Parameters::default();
+    // 1 is in the parameter's range.
+    let _ = parameters.set_id(ParameterId::Lookahead, 1.0);
+    parameters
 }
 
 /// The parameters that the file at `path` sets, the others at their defaults. Nothing else of the file is checked.

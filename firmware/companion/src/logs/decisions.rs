@@ -3,7 +3,7 @@
 use super::rotation::{Limits, RotatingFile};
 use super::writer::{LogWriter, NewsSender};
 use crate::error::StartError;
-use gleaner_pilot::{Decision, LoggedDecision};
+use gleaner_pilot::{Decision, LoggedDecision, LoggedLookAhead};
 use gleaner_units::{Duration, Ned};
 use std::path::Path;
 
@@ -31,9 +31,16 @@ impl DecisionLog {
     }
 
     /// Hands one decision to the writer. Never waits.
-    pub fn write(&mut self, decision: &Decision, inference_time: Option<Duration>, position: Option<Ned>) {
+    pub fn write(
+        &mut self,
+        decision: &Decision,
+        inference_time: Option<Duration>,
+        position: Option<Ned>,
+        lookahead: Option<LoggedLookAhead>,
+    ) {
         let logged = LoggedDecision {
             position_ned_m: position.map(|at| [at.north_m, at.east_m, at.down_m]),
+            lookahead,
             ..LoggedDecision::new(self.run_s, decision, inference_time)
         };
         // Serialising cannot fail: every key is a string.

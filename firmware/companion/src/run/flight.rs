@@ -11,7 +11,7 @@ use crate::clock;
 use crate::logs::LogNews;
 use crate::routing::Links;
 use gleaner_link::{MAX_FRAME_BYTES, Severity};
-use gleaner_pilot::{Onboard, POLL_INTERVAL};
+use gleaner_pilot::{LookingAhead, Onboard, POLL_INTERVAL};
 use gleaner_policy::{Engine, Timed};
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use std::time::{Duration, Instant};
@@ -34,7 +34,7 @@ const TRAFFIC_PERIOD: Duration = Duration::from_secs(10);
 
 /// The pilot with everything around it.
 pub struct Flight {
-    onboard: Onboard<Timed<Engine>>,
+    onboard: Onboard<LookingAhead<Timed<Engine>>>,
     links: Links,
     radio: Option<Port>,
     radio_decoder: RadioDecoder,
@@ -50,7 +50,7 @@ pub struct Flight {
 impl Flight {
     /// A pilot that has not been polled yet.
     pub fn new(
-        onboard: Onboard<Timed<Engine>>,
+        onboard: Onboard<LookingAhead<Timed<Engine>>>,
         links: Links,
         (radio, radio_decoder): (Option<Port>, RadioDecoder),
         logs: Logs,
@@ -140,15 +140,16 @@ impl Flight {
         self.polled_at = now;
         self.service.feed(now);
         self.revoke();
-        let took = self.onboard.policy().take();
+        let took = self.onboard.policy().network().take();
         if let Some(took) = took {
             self.onboard.set_inference_time(took);
         }
         let position = self.onboard.link().autopilot().position(clock::at(now), MAX_POSITION_AGE);
+        let lookahead = self.onboard.logged_lookahead(clock::at(now));
         if let Some(decision) = self.onboard.decision() {
             self.console.decision(decision);
             if let Some(log) = &mut self.logs.decisions {
-                log.write(decision, took, position.map(|report| report.position));
+                log.write(decision, took, position.map(|report| report.position), lookahead);
             }
         }
         if self.console.state(self.onboard.state()) {

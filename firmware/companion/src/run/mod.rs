@@ -16,7 +16,7 @@ use crate::routing::{Links, SignedPort, read_key};
 use console::Console;
 use flight::Flight;
 use gleaner_link::Parameters;
-use gleaner_pilot::Onboard;
+use gleaner_pilot::{Budget, LookingAhead, Onboard};
 use gleaner_policy::Timed;
 use gleaner_ports::{Endpoint, Peers, Port};
 use radio::RadioDecoder;
@@ -37,7 +37,8 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let model = format!("{}, engine {engine}", engine.name());
     let (kept, parameters, lines) = Kept::open(&config, order.reset_parameters)?;
     // The engine reproduced its golden pairs, or it would not have been loaded.
-    let onboard = Onboard::new(mission, parameters, config.settings, Timed::new(engine, clock::now), Ok(()))
+    let policy = LookingAhead::new(Timed::new(engine, clock::now), Budget::LINUX);
+    let onboard = Onboard::new(mission, parameters, config.settings, policy, Ok(()))
         .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
     let logs = Logs::open(&config)?;
     let links = open_links(&config)?;

@@ -2,8 +2,7 @@
 
 use crate::clock;
 use crate::config::RadioFormat;
-use gleaner_pilot::Onboard;
-use gleaner_policy::Policy;
+use gleaner_pilot::{Deliberator, Onboard};
 use gleaner_ports::Port;
 use gleaner_radio::{Format, JsonLines, SemtechUdp};
 
@@ -28,7 +27,7 @@ impl RadioDecoder {
     }
 
     /// Gives the pilot the reports in `bytes`, and answers their sender.
-    pub fn receive<P: Policy>(&mut self, bytes: &[u8], onboard: &mut Onboard<P>, port: &mut Port) {
+    pub fn receive<P: Deliberator>(&mut self, bytes: &[u8], onboard: &mut Onboard<P>, port: &mut Port) {
         let now = clock::now();
         match self {
             RadioDecoder::Cobs => onboard.receive_radio(now, bytes),

@@ -1,11 +1,12 @@
 //! How a decision is made: by the policy inside the guard's mask, or by the guard alone.
 
-use super::Decision;
+use super::{Decision, Deliberator, Place};
 use crate::exchange::{collected, device_states};
 use crate::scene::Scene;
 use crate::{Outputs, ReturnReason, State};
-use gleaner_policy::{Policy, Situation, Tokens};
-use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Rays};
+use gleaner_link::Severity;
+use gleaner_policy::{DeviceState, Situation, Tokens};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Rays, Sight};
 
 /// Where a decision is made.
 #[derive(Clone, Copy, Debug)]
@@ -21,11 +22,15 @@ pub(crate) struct Standpoint {
 pub(crate) struct Decider {
     last: Option<Decision>,
     count: u32,
+    /// Whether the next decision is the first of a mission.
+    begins: bool,
+    /// Whether the network decided the last slot although look-ahead is switched on.
+    fell_back: bool,
 }
 
 impl Decider {
     pub(crate) const fn new() -> Decider {
-        Decider { last: None, count: 0 }
+        Decider { last: None, count: 0, begins: true, fell_back: false }
     }
 
     pub(crate) const fn last(&self) -> Option<&Decision> {
@@ -36,6 +41,12 @@ impl Decider {
         self.count
     }
 
+    /// A mission begins: with the next decision the look-ahead forgets plan and channel.
+    pub(crate) const fn begin_mission(&mut self) {
+        self.begins = true;
+        self.fell_back = false;
+    }
+
     /// The policy's best action among those that the guard allows.
     ///
     /// # Errors
@@ -43,19 +54,30 @@ impl Decider {
     /// for one action is not believed for the others. There is no last decision then.
     ///
     /// # Cost
-    /// One inference.
+    /// One inference, and a search if there is look-ahead.
     #[inline(never)]
-    pub(crate) fn ask<P: Policy>(
+    pub(crate) fn ask<D: Deliberator>(
         &mut self,
         scene: &Scene<'_>,
         at: Standpoint,
-        policy: &mut P,
+        policy: &mut D,
         out: &mut Outputs,
     ) -> Result<Action, ReturnReason> {
         let mask = scene.guard.mask(at.cell, at.battery);
+        let begins = core::mem::take(&mut self.begins);
         let decision = self.draft(scene, at, Action::Hover, mask);
         match infer(policy, decision) {
             Ok(()) => {
+                if D::LOOKS_AHEAD {
+                    look_ahead(policy, scene, decision, begins);
+                    let is_alone = decision.lookahead.is_none_or(|record| record.tours == 0);
+                    let fell_back = is_alone && scene.inputs.parameters.looks_ahead();
+                    if fell_back && !self.fell_back {
+                        out.say(Severity::Notice, format_args!("gleaner: no look-ahead, network decides"));
+                    }
+                    self.fell_back = fell_back;
+                }
+                let decision = self.last.as_ref().ok_or(ReturnReason::Policy)?;
                 let action = decision.action;
                 self.publish(out);
                 Ok(action)
@@ -121,12 +143,37 @@ impl Decider {
             inference: None,
             attended: None,
             collected: collected(mission, scene.inputs.devices),
+            lookahead: None,
         })
     }
 }
 
-fn infer<P: Policy>(policy: &mut P, decision: &mut Decision) -> Result<(), ReturnReason> {
-    let answer = policy.infer(&decision.tokens).map_err(|_| ReturnReason::Policy);
+/// Lets the look-ahead choose among the actions that the guard allows.
+fn look_ahead<D: Deliberator>(policy: &mut D, scene: &Scene<'_>, decision: &mut Decision, begins: bool) {
+    let mission = scene.mission;
+    if begins {
+        let altitude_m = scene.inputs.parameters.altitude().0 as u16;
+        let rays = Rays { heights: &mission.heights, altitude_m };
+        // A map without any building is no map: the model would take every link for unobstructed.
+        let has_map = mission.heights.tallest().0 > 0.0;
+        let sites = mission.devices.iter();
+        let full = sites.map(|site| DeviceState { cell: site.cell, remaining: site.data, snr: None });
+        policy.begin(has_map.then_some(&rays as &dyn Sight), full, mission.seed());
+    }
+    let Some(inference) = &decision.inference else { return };
+    let Decision { cell, battery, preference, mask, .. } = *decision;
+    let place = Place { cell, battery, preference, guard: scene.guard };
+    let devices = device_states(mission, scene.inputs.devices);
+    let is_on = scene.inputs.parameters.looks_ahead();
+    let proposed = policy.propose(&place, devices, &inference.logits, mask, is_on);
+    if let Some((action, record)) = proposed.filter(|(action, _)| mask.allows(*action)) {
+        decision.action = action;
+        decision.lookahead = Some(record);
+    }
+}
+
+fn infer<D: Deliberator>(policy: &mut D, decision: &mut Decision) -> Result<(), ReturnReason> {
+    let answer = policy.infer(&decision.tokens).ok_or(ReturnReason::Policy);
     let inference = decision.inference.insert(answer?);
     if !inference.logits.iter().all(|logit| logit.is_finite()) {
         return Err(ReturnReason::Policy);

@@ -1,5 +1,6 @@
 //! One decision: whole for the log on board, short for the wire.
 
+use super::LookAheadRecord;
 use crate::State;
 use gleaner_policy::{Inference, Preference, Slots, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Instant};
@@ -39,6 +40,8 @@ pub struct Decision {
     pub attended: Option<u16>,
     /// Fraction of the initial data that is known to be collected.
     pub collected: f32,
+    /// How the look-ahead came to the action; `None` in a program without look-ahead.
+    pub lookahead: Option<LookAheadRecord>,
 }
 
 /// What a ground station gets of a [`Decision`]: postcard in `TUNNEL` type 40001.
@@ -68,6 +71,8 @@ pub struct DecisionRecord {
     pub attended: Option<u16>,
     /// Fraction of the initial data that is known to be collected.
     pub collected: f32,
+    /// How the look-ahead came to the action; `None` in a program without look-ahead.
+    pub lookahead: Option<LookAheadRecord>,
 }
 
 impl Decision {
@@ -87,6 +92,7 @@ impl Decision {
             logits: self.inference.as_ref().map(|inference| inference.logits),
             attended: self.attended,
             collected: self.collected,
+            lookahead: self.lookahead,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! One line of a decision log (`decisions.jsonl`), as `gleaner` and `gleaner-sitl` write it and `gleaner replay`
 //! reads it.
 
+use super::LoggedLookAhead;
 use crate::{Decision, DecisionRecord, State};
 use gleaner_policy::{Slots, Tokens};
 use gleaner_units::{Action, ActionMask, Duration};
@@ -49,6 +50,9 @@ pub struct LoggedDecision {
     pub slots: Slots,
     /// The model's input.
     pub tokens: Tokens,
+    /// What the look-ahead was given and what it answered; absent in a program without look-ahead.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lookahead: Option<LoggedLookAhead>,
     /// What only a simulation knows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<SimulatedSlot>,
@@ -102,6 +106,7 @@ impl LoggedDecision {
             position_ned_m: None,
             slots,
             tokens,
+            lookahead: None,
             truth: None,
         }
     }

@@ -2,10 +2,16 @@
 
 mod decider;
 mod decision;
+mod deliberator;
 #[cfg(feature = "std")]
 mod logged;
+#[cfg(feature = "std")]
+mod replay;
 
 pub(crate) use decider::{Decider, Standpoint};
 pub use decision::{Decision, DecisionRecord, RECORD_BYTES_MAX};
+pub use deliberator::{Deliberator, LookAheadRecord, LookingAhead, Place};
 #[cfg(feature = "std")]
 pub use logged::{LoggedDecision, SimulatedSlot};
+#[cfg(feature = "std")]
+pub use replay::{LoggedDevice, LoggedLookAhead, LoggedMission, LookAheadReplay, Replayed};

@@ -7,14 +7,13 @@ mod transition;
 
 use self::monitor::Monitor;
 use self::phase::Phase;
-use crate::decide::{Decider, Decision};
+use crate::decide::{Decider, Decision, Deliberator};
 use crate::flight::energy::Energy;
 use crate::scene::Scene;
 use crate::states::{Outcome, landing};
 use crate::{Fault, Inputs, Missing, Mission, MissionError, Outputs, ReturnReason, State, TakeOver};
 use gleaner_guard::Guard;
 use gleaner_link::SystemState;
-use gleaner_policy::Policy;
 use gleaner_units::{BatteryUnits, Cell, Instant};
 
 /// The mission machine. About ten kilobytes, no heap.
@@ -68,8 +67,8 @@ impl Machine {
     /// One step. Call at 20 Hz or more.
     ///
     /// # Cost
-    /// One inference when a decision is due, else a few hundred operations.
-    pub fn poll<P: Policy>(&mut self, now: Instant, inputs: &Inputs<'_>, policy: &mut P) -> Outputs {
+    /// One inference and, with look-ahead, one search when a decision is due, else a few hundred operations.
+    pub fn poll<D: Deliberator>(&mut self, now: Instant, inputs: &Inputs<'_>, policy: &mut D) -> Outputs {
         let mut out = Outputs::default();
         let late = self.monitor.keep_time(now);
         // The parameter's range is within what the guard accepts.
@@ -87,17 +86,18 @@ impl Machine {
         let outcome = self.step(now, late, inputs, policy, &mut out);
         self.apply(now, outcome, inputs, &mut out);
         self.send_target(now, inputs, &mut out);
-        self.report(now, inputs, &mut out);
+        let snr_off = policy.channel().map(|channel| channel.gain_db[1]);
+        self.report(now, inputs, snr_off, &mut out);
         out
     }
 
     /// Lets the current state look at the scene.
-    fn step<P: Policy>(
+    fn step<D: Deliberator>(
         &mut self,
         now: Instant,
         late: bool,
         inputs: &Inputs<'_>,
-        policy: &mut P,
+        policy: &mut D,
         out: &mut Outputs,
     ) -> Outcome {
         let Machine { mission, guard, phase, decider, energy, monitor, .. } = self;

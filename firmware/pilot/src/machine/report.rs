@@ -9,7 +9,13 @@ use gleaner_units::{Duration, Instant};
 const PERIOD: Duration = Duration::from_secs(1);
 
 impl Machine {
-    pub(super) fn report(&mut self, now: Instant, inputs: &Inputs<'_>, out: &mut Outputs) {
+    pub(super) fn report(
+        &mut self,
+        now: Instant,
+        inputs: &Inputs<'_>,
+        snr_off: Option<f32>,
+        out: &mut Outputs,
+    ) {
         if !self.monitor.report_due(now, PERIOD) {
             return;
         }
@@ -33,6 +39,7 @@ impl Machine {
             attended: decider.last().and_then(|decision| decision.attended),
             unit_pct: energy.unit_percent(&scene),
             land_pct: cell.and_then(|cell| energy.touchdown_percent(&scene, cell)),
+            snr_off,
         });
     }
 }

@@ -40,7 +40,10 @@ impl Machine {
                 out.say(Severity::Warning, format_args!("gleaner: refused, autopilot failsafe"));
             }
             Request::Engage => self.enter(Phase::Waiting(Wait::new(now, inputs.vehicle)), out),
-            Request::Shadow => self.enter(Phase::Shadow(Shadow::default()), out),
+            Request::Shadow => {
+                self.decider.begin_mission();
+                self.enter(Phase::Shadow(Shadow::default()), out);
+            }
             Request::Return => match self.state() {
                 State::Engaged => self.go_home(ReturnReason::Request, out),
                 State::Homing => {}
@@ -62,6 +65,7 @@ impl Machine {
                     _ => Default::default(),
                 };
                 self.energy.open(plan.battery);
+                self.decider.begin_mission();
                 let flight = Flight::new(now, plan, stream, inputs.vehicle.position);
                 self.enter(Phase::Flying(flight), out);
                 self.announce_touchdown(now, inputs, out);

@@ -114,6 +114,13 @@ impl Mission {
         self.devices.iter().map(|device| device.data).sum()
     }
 
+    /// A number for random draws: equal for equal missions (FNV-1a over terminal and devices).
+    #[must_use]
+    pub fn seed(&self) -> u32 {
+        let sites = self.devices.iter().map(|site| (site.cell, site.data.to_bits()));
+        sites.fold(mix(0x811C_9DC5, self.terminal, 0), |hash, (cell, data)| mix(hash, cell, data))
+    }
+
     /// Whether the mission makes sense.
     ///
     /// # Errors
@@ -154,4 +161,11 @@ impl Mission {
         self.check()?;
         Guard::new(&self.fence, self.terminal, reserve).map_err(MissionError::Guard)
     }
+}
+
+/// FNV-1a over a cell and a number.
+fn mix(hash: u32, cell: Cell, number: u32) -> u32 {
+    let [x, y] = [cell.x, cell.y].map(i16::to_le_bytes);
+    let bytes = x.into_iter().chain(y).chain(number.to_le_bytes());
+    bytes.fold(hash, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }

@@ -14,13 +14,14 @@ use self::rc::Knob;
 use self::recall::Recall;
 use crate::exchange::{collected, device_states};
 use crate::{
-    Decision, Fault, Inputs, MAX_DEVICES, Machine, Missing, Mission, ReturnReason, Rules, State, Vehicle,
+    Decision, Deliberator, Fault, Inputs, MAX_DEVICES, Machine, Missing, Mission, ReturnReason, Rules, State,
+    Vehicle,
 };
 use core::fmt;
 use gleaner_link::{
     AutopilotCommand, Component, Enable, LinkStats, ParameterId, Parameters, Severity, Status,
 };
-use gleaner_policy::{DeviceState, Policy, SelfTestError};
+use gleaner_policy::{DeviceState, SelfTestError};
 use gleaner_radio::{Report, ReportStats, TableStats};
 use gleaner_units::{BatteryUnits, Cell, Duration, Instant};
 use heapless::Vec;
@@ -73,7 +74,7 @@ pub struct Onboard<P> {
     decision_taken: bool,
 }
 
-impl<P: Policy> Onboard<P> {
+impl<P: Deliberator> Onboard<P> {
     /// A pilot at boot. `self_test` is the result of [`gleaner_policy::self_test`] with this policy; after a
     /// failure the pilot speaks but never engages. `GLN_ENABLE` starts at 0 whatever `parameters` contain: only a
     /// request in this run engages.
@@ -281,6 +282,18 @@ impl<P: Policy> Onboard<P> {
     pub fn device_states(&self, now: Instant) -> Vec<DeviceState, MAX_DEVICES> {
         let heard = self.heard.at(now, self.link.parameters().snr_age());
         device_states(self.machine.mission(), &heard).collect()
+    }
+
+    /// The look-ahead's part of the last decision, for a log; `None` in a program without look-ahead. To be called after the
+    /// poll at `now` in which it was decided.
+    #[cfg(feature = "std")]
+    #[must_use]
+    pub fn logged_lookahead(&self, now: Instant) -> Option<crate::LoggedLookAhead> {
+        let record = self.machine.decision()?.lookahead?;
+        let parameters = self.link.parameters();
+        let settings = (parameters.altitude(), parameters.reserve());
+        let devices = self.device_states(now);
+        Some(crate::LoggedLookAhead::new(record, self.machine.mission(), settings, devices))
     }
 
     /// The parameters as they are now.

@@ -1,9 +1,8 @@
 //! From the link's events to the machine's inputs.
 
 use super::Onboard;
-use crate::{Request, State};
+use crate::{Deliberator, Request, State};
 use gleaner_link::{AutopilotCommand, Enable, Event, OperatorRequest, Outcome, ParameterId};
-use gleaner_policy::Policy;
 use gleaner_radio::decode_body;
 use gleaner_units::Instant;
 use heapless::Vec;
@@ -27,7 +26,7 @@ impl Received {
     }
 }
 
-impl<P: Policy> Onboard<P> {
+impl<P: Deliberator> Onboard<P> {
     pub(super) fn take_events(&mut self, now: Instant) -> Received {
         let mut received = Received::default();
         for &refused in &self.refused {

@@ -1,12 +1,11 @@
 //! From the machine's outputs to the link.
 
 use super::Onboard;
-use crate::{Outputs, RECORD_BYTES_MAX, State};
-use gleaner_link::{Enable, ParameterId, PositionTarget, TUNNEL_DECISION};
-use gleaner_policy::Policy;
+use crate::{Deliberator, Outputs, RECORD_BYTES_MAX, State};
+use gleaner_link::{Enable, ParameterId, PositionTarget, Severity, TUNNEL_DECISION};
 use gleaner_units::Instant;
 
-impl<P: Policy> Onboard<P> {
+impl<P: Deliberator> Onboard<P> {
     pub(super) fn send(&mut self, now: Instant, out: &Outputs) {
         if out.withdraw {
             self.link.revoke();
@@ -26,6 +25,7 @@ impl<P: Policy> Onboard<P> {
         }
         self.recall.heard(self.link.autopilot().heartbeat_at());
         self.show_enable();
+        self.show_lookahead();
         self.send_decision(out);
         self.send_telemetry(now, out);
     }
@@ -40,6 +40,15 @@ impl<P: Policy> Onboard<P> {
         if self.link.parameters().enable() != truth {
             // All three are in the parameter's range.
             let _ = self.link.set_parameter(ParameterId::Enable, truth.value());
+        }
+    }
+
+    /// `GLN_LOOKAHEAD` stays 0 in a program that has none.
+    fn show_lookahead(&mut self) {
+        if !P::LOOKS_AHEAD && self.link.parameters().looks_ahead() {
+            // 0 is in the parameter's range.
+            let _ = self.link.set_parameter(ParameterId::Lookahead, 0.0);
+            self.link.say(Severity::Warning, format_args!("gleaner: this program has no look-ahead"));
         }
     }
 
@@ -63,7 +72,7 @@ impl<P: Policy> Onboard<P> {
             attended_device: telemetry.attended.map(f32::from),
             unit_percent: Some(telemetry.unit_pct),
             landing_percent: telemetry.land_pct,
-            snr_offset_db: None,
+            snr_offset_db: telemetry.snr_off,
         };
         self.link.send_telemetry(now, &values);
     }

@@ -3,7 +3,7 @@
 use super::Outcome;
 use super::hand_back::Left;
 use super::landing::Landing;
-use crate::decide::{Decider, Standpoint};
+use crate::decide::{Decider, Deliberator, Standpoint};
 use crate::flight::energy::Energy;
 use crate::flight::leg::{Leg, Progress, Purpose};
 use crate::flight::plan::Plan;
@@ -12,7 +12,6 @@ use crate::flight::watch::{Finding, Watch, origin_moved};
 use crate::scene::Scene;
 use crate::{Fault, Outputs, ReturnReason, State, TakeOver};
 use gleaner_link::{AutopilotCommand, Firmware, Severity};
-use gleaner_policy::Policy;
 use gleaner_units::{Action, Cell, Decimal, Duration, Instant, Metres, MetresPerSecond, Ned};
 
 /// How long the estimator may mistrust itself before the position counts as lost.
@@ -96,12 +95,12 @@ impl Flight {
         Left { at: position.filter(Ned::is_finite).unwrap_or(self.leg.target), within_m, unheard: false }
     }
 
-    pub(crate) fn step<P: Policy>(
+    pub(crate) fn step<D: Deliberator>(
         &mut self,
         scene: &Scene<'_>,
         energy: &mut Energy,
         decider: &mut Decider,
-        policy: &mut P,
+        policy: &mut D,
         out: &mut Outputs,
     ) -> Outcome {
         let position = match self.judge(scene) {
@@ -265,12 +264,12 @@ impl Flight {
     }
 
     /// One decision of the policy, or the reason why the guard goes on alone.
-    fn decide<P: Policy>(
+    fn decide<D: Deliberator>(
         &mut self,
         scene: &Scene<'_>,
         energy: &mut Energy,
         decider: &mut Decider,
-        policy: &mut P,
+        policy: &mut D,
         out: &mut Outputs,
     ) -> Outcome {
         let battery = energy.available(scene);

@@ -1,12 +1,11 @@
 //! Shadow: decides and logs as if engaged, commands nothing.
 
 use super::Outcome;
-use crate::decide::{Decider, Standpoint};
+use crate::decide::{Decider, Deliberator, Standpoint};
 use crate::flight::energy::Energy;
 use crate::scene::Scene;
 use crate::{Outputs, State};
 use gleaner_link::Severity;
-use gleaner_policy::Policy;
 use gleaner_units::{Cell, Instant};
 
 /// The last decision of shadow mode.
@@ -18,12 +17,12 @@ pub(crate) struct Shadow {
 
 impl Shadow {
     /// Decides when the aircraft reaches the centre of another cell, and after each slot.
-    pub(crate) fn step<P: Policy>(
+    pub(crate) fn step<D: Deliberator>(
         &mut self,
         scene: &Scene<'_>,
         energy: &Energy,
         decider: &mut Decider,
-        policy: &mut P,
+        policy: &mut D,
         out: &mut Outputs,
     ) -> Outcome {
         let vehicle = scene.vehicle();

@@ -179,7 +179,9 @@ fn telemetry_comes_once_a_second() {
 
 #[test]
 fn a_decision_record_fits_a_tunnel_and_comes_back() {
-    use gleaner_pilot::{DecisionRecord, RECORD_BYTES_MAX};
+    use gleaner_pilot::{
+        ChannelEstimate, DecisionRecord, Expected, LookAheadRecord, RECORD_BYTES_MAX, Source,
+    };
     let mut rig = Rig::engaged();
     rig.run(1.0);
     let mut record = rig.machine.decision().unwrap().record();
@@ -187,6 +189,15 @@ fn a_decision_record_fits_a_tunnel_and_comes_back() {
     record.time_ms = u32::MAX;
     record.cell = Cell::new(i16::MIN, i16::MAX);
     record.attended = Some(u16::MAX);
+    record.lookahead = Some(LookAheadRecord {
+        source: Source::SingleMove,
+        expected: Some(Expected { data_units: 5e4, energy: 80.0 }),
+        budget: u32::MAX,
+        tours: u32::MAX,
+        seed: u32::MAX,
+        slot: u16::MAX,
+        channel: ChannelEstimate::default(),
+    });
     let mut buffer = [0; RECORD_BYTES_MAX];
     let bytes = record.encode(&mut buffer).expect("the longest record fits");
     assert_eq!(DecisionRecord::decode(bytes), Some(record));

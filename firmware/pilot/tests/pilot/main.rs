@@ -7,6 +7,7 @@ mod explorer;
 mod facts;
 mod flight;
 mod invariants;
+mod lookahead;
 mod mission;
 #[cfg(feature = "std")]
 mod mission_file;

@@ -3,8 +3,8 @@
 use gleaner_guard::Guard;
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters};
 use gleaner_pilot::{
-    DeviceSite, Devices, Inputs, Machine, Mission, Outputs, RadioActivity, Request, Rules, State, Telemetry,
-    Vehicle,
+    DeviceSite, Devices, Inputs, LookingAhead, Machine, Mission, Outputs, RadioActivity, Request, Rules,
+    State, Telemetry, Vehicle,
 };
 use gleaner_policy::{Attention, DeviceState, Inference, Policy, Tokens};
 use gleaner_units::{
@@ -87,6 +87,8 @@ pub struct Rig {
     pub radio_reports: bool,
     radio: RadioActivity,
     pub policy: Scripted,
+    /// Decides in place of `policy`, if it is there.
+    pub ahead: Option<LookingAhead<Scripted>>,
     pub now: Instant,
     pub request: Option<Request>,
     pub other_mode_seen: bool,
@@ -149,6 +151,7 @@ impl Rig {
                 logit: 1.0,
                 asked: Vec::new(),
             },
+            ahead: None,
             now: Instant::from_millis(10_000),
             request: None,
             other_mode_seen: false,
@@ -224,7 +227,10 @@ impl Rig {
             ended: &ended,
             engage_inhibited: self.engage_inhibited,
         };
-        let out = self.machine.poll(self.now, &inputs, &mut self.policy);
+        let out = match &mut self.ahead {
+            Some(ahead) => self.machine.poll(self.now, &inputs, ahead),
+            None => self.machine.poll(self.now, &inputs, &mut self.policy),
+        };
         let at_ms = self.now.as_millis();
         self.telemetry = out.telemetry.filter(|told| told.land_pct.is_some()).or(self.telemetry);
         self.revoked |= out.withdraw;

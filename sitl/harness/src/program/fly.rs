@@ -7,7 +7,7 @@ use super::{ProgramError, load, model, results};
 use crate::{
     Ending, Figures, FlightError, FlightResult, FlightRun, FlightScript, MissionSetup, Wired, fly_wired,
 };
-use gleaner_pilot::Settings;
+use gleaner_pilot::{Budget, LookingAhead, Settings};
 use gleaner_ports::{Endpoint, Port};
 use std::time::{Duration, Instant};
 
@@ -25,7 +25,11 @@ pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
         None => {
             let policy = model::load(order.model.as_deref(), order.engine)?;
             let policy_info = model::info(&policy);
-            (crate::fly(setup, script, policy, Ok(()))?, policy_info)
+            let flown = match order.lookahead {
+                true => crate::fly(setup, script, LookingAhead::new(policy, Budget::LINUX), Ok(())),
+                false => crate::fly(setup, script, policy, Ok(())),
+            };
+            (flown?, policy_info)
         }
         Some(board) => (fly_board(order, board, setup, script)?, PolicyInfo::outside("board")),
     };

@@ -65,7 +65,7 @@ pub(super) fn write_files(
     };
     let journal = simulation.journal();
     write("flight.tlog", &|out| journal.write_tlog(out))?;
-    write("decisions.jsonl", &|out| journal.write_decisions(&simulation.setup().mission, out))?;
+    write("decisions.jsonl", &|out| journal.write_decisions(simulation.setup(), out))?;
     let picture = picture::trajectory(simulation, figures, model);
     let path = write("trajectory.svg", &|out| out.write_all(picture.as_bytes()))?;
     Ok(path.canonicalize().unwrap_or(path))

@@ -5,12 +5,13 @@ use super::announce::{ports, write_mission};
 use super::arguments::ServeOrder;
 use super::results::PolicyInfo;
 use super::{load, model, results};
+use crate::companion::parameters;
 use crate::wired::receive;
 use crate::{
     AutopilotKind, Companion, Figures, FlightError, MissionSetup, Operator, Orders, Pace, STEP, Simulation,
     Wired,
 };
-use gleaner_pilot::{Onboard, Parameters, Settings};
+use gleaner_pilot::{Budget, LookingAhead, Onboard, Settings};
 use gleaner_policy::Engine;
 use gleaner_ports::{Endpoint, Port, wait};
 use gleaner_units::{Duration, Instant};
@@ -40,7 +41,7 @@ pub(super) fn serve(order: &ServeOrder) -> Result<bool, ProgramError> {
 #[expect(clippy::large_enum_variant, reason = "one value in a process")]
 enum Pilot {
     /// In this process, on the aircraft's clock.
-    Inside(Box<Onboard<Engine>>, PolicyInfo),
+    Inside(Box<Onboard<LookingAhead<Engine>>>, PolicyInfo),
     /// Behind a port, on the wall clock.
     Outside(Wired),
 }
@@ -52,7 +53,8 @@ impl Pilot {
             let policy = model::load(order.model.as_deref(), order.engine)?;
             let policy_info = model::info(&policy);
             let (mission, settings) = (setup.mission.clone(), Settings::default());
-            let onboard = Onboard::new(mission, Parameters::default(), settings, policy, Ok(()));
+            let policy = LookingAhead::new(policy, Budget::LINUX);
+            let onboard = Onboard::new(mission, parameters(order.lookahead), settings, policy, Ok(()));
             return Ok(Pilot::Inside(Box::new(onboard.map_err(FlightError::Onboard)?), policy_info));
         };
         Ok(Pilot::Outside(Wired::new(open(companion)?, order.radio.as_ref().map(open).transpose()?)))

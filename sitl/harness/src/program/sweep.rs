@@ -5,6 +5,7 @@ use super::results;
 use super::shrink::{self, Failure};
 use super::{ProgramError, model};
 use crate::{AutopilotKind, Ending, FlightError, FlightResult, MissionSetup, Trial};
+use gleaner_pilot::{Budget, LookingAhead};
 use gleaner_policy::Engine;
 use gleaner_world::World;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -141,7 +142,11 @@ fn judge(
     }
     let mut fly = |trial: &Trial| -> Result<FlightResult, ProgramError> {
         let setup = MissionSetup::new(Arc::clone(world), trial.plan).map_err(FlightError::from)?;
-        Ok(crate::fly(setup, trial.script.clone(), &mut *policy, Ok(()))?)
+        let script = trial.script.clone();
+        Ok(match order.lookahead {
+            true => crate::fly(setup, script, LookingAhead::new(&mut *policy, Budget::LINUX), Ok(())),
+            false => crate::fly(setup, script, &mut *policy, Ok(())),
+        }?)
     };
     let result = fly(&trial)?;
     let faults = faults(&result);

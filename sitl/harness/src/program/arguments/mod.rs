@@ -72,6 +72,9 @@ struct SweepArguments {
     /// Engine that runs the model: native, or tract in a build with that feature.
     #[arg(long, value_name = "ENGINE", default_value = "native")]
     engine: EngineKind,
+    /// 1: the pilot looks ahead in its model of the mission (GLN_LOOKAHEAD); 0: the network alone decides.
+    #[arg(long, value_name = "0|1", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=1))]
+    lookahead: u8,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -125,6 +128,9 @@ struct MissionArguments {
     /// Engine that runs the model: native, or tract in a build with that feature.
     #[arg(long, value_name = "ENGINE", default_value = "native")]
     engine: EngineKind,
+    /// 1: the pilot looks ahead in its model of the mission (GLN_LOOKAHEAD); 0: the network alone decides.
+    #[arg(long, value_name = "0|1", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=1))]
+    lookahead: u8,
 }
 
 #[derive(Debug, Args)]
@@ -264,6 +270,7 @@ impl FlyArguments {
             switches,
             model: self.mission.model,
             engine: self.mission.engine,
+            lookahead: self.mission.lookahead == 1,
             board: self.board.map(|autopilot| BoardOrder { autopilot, radio: self.radio }),
             mission_out: self.mission_out,
             json: self.json,
@@ -288,6 +295,7 @@ impl ServeArguments {
             until_landed: self.until_landed,
             model: self.mission.model,
             engine: self.mission.engine,
+            lookahead: self.mission.lookahead == 1,
             json: self.json,
             out: self.out,
         }
@@ -305,6 +313,7 @@ impl SweepArguments {
             jobs: self.jobs.map(usize::from),
             model: self.model,
             engine: self.engine,
+            lookahead: self.lookahead == 1,
             json: self.json,
             table: self.table,
             out: self.out,

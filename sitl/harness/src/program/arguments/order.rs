@@ -78,6 +78,8 @@ pub(crate) struct SweepOrder {
     pub jobs: Option<usize>,
     pub model: Option<PathBuf>,
     pub engine: EngineKind,
+    /// Whether the pilot looks ahead.
+    pub lookahead: bool,
     pub json: bool,
     pub table: Option<PathBuf>,
     pub out: PathBuf,
@@ -105,6 +107,9 @@ impl SweepOrder {
         if self.engine != EngineKind::Native {
             command.push_str(" --engine tract");
         }
+        if !self.lookahead {
+            command.push_str(" --lookahead 0");
+        }
         command
     }
 }
@@ -127,6 +132,8 @@ pub(crate) struct FlyOrder {
     pub switches: Vec<Switch>,
     pub model: Option<PathBuf>,
     pub engine: EngineKind,
+    /// Whether the pilot looks ahead.
+    pub lookahead: bool,
     pub board: Option<BoardOrder>,
     pub mission_out: Option<PathBuf>,
     pub json: bool,
@@ -154,6 +161,8 @@ pub(crate) struct ServeOrder {
     pub until_landed: bool,
     pub model: Option<PathBuf>,
     pub engine: EngineKind,
+    /// Whether the pilot in this process looks ahead.
+    pub lookahead: bool,
     pub json: bool,
     pub out: PathBuf,
 }

@@ -1,0 +1,181 @@
+//! What decides: a network alone, or a network with look-ahead.
+
+use gleaner_guard::Guard;
+use gleaner_lookahead::{
+    Budget, ChannelEstimate, ChannelModel, Expected, FitSettings, LookAhead, Source, View,
+};
+use gleaner_policy::{DeviceState, Inference, Policy, Preference, Tokens};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Sight};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+use crate::MAX_DEVICES;
+
+/// The aircraft's situation when a decision is due.
+#[derive(Clone, Copy)]
+pub struct Place<'a> {
+    /// The cell that the aircraft is in.
+    pub cell: Cell,
+    /// Battery left.
+    pub battery: BatteryUnits,
+    /// The operator's preference.
+    pub preference: Preference,
+    /// Fence, terminal and reserve.
+    pub guard: &'a Guard,
+}
+
+/// How the look-ahead came to an action.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LookAheadRecord {
+    /// Where the action comes from.
+    pub source: Source,
+    /// What the model expects of the rest of the mission; `None` where the network decided alone.
+    pub expected: Option<Expected>,
+    /// Tours that a decision may take; 0 while look-ahead is switched off.
+    pub budget: u32,
+    /// Tours that were evaluated; 0 where the network decided alone.
+    pub tours: u32,
+    /// Seed of the random draws of this mission.
+    pub seed: u32,
+    /// Decisions since the look-ahead began this mission. With `seed` it makes a replay possible.
+    pub slot: u16,
+    /// The channel as estimated from the reports so far.
+    pub channel: ChannelEstimate,
+}
+
+/// What the machine decides with. Each [`Policy`] is one that decides alone; [`LookingAhead`] plans as well.
+///
+/// The result must depend on the arguments and on earlier calls only, so that a decision log can be replayed.
+pub trait Deliberator {
+    /// Whether there is a look-ahead. Without one `GLN_LOOKAHEAD` stays 0.
+    const LOOKS_AHEAD: bool;
+
+    /// Evaluates the network; `None` when the engine failed.
+    fn infer(&mut self, tokens: &Tokens) -> Option<Inference>;
+
+    /// A mission begins. `sight` is `None` without a map of buildings; `devices` hold the data of the start.
+    fn begin(&mut self, sight: Option<&dyn Sight>, devices: impl Iterator<Item = DeviceState>, seed: u32);
+
+    /// The action for this slot, inside `mask`; `None` leaves it to the network. To be called once a slot, also while
+    /// look-ahead is switched off (`is_on`), because the channel is estimated all the time.
+    fn propose(
+        &mut self,
+        place: &Place<'_>,
+        devices: impl Iterator<Item = DeviceState>,
+        logits: &[f32; Action::COUNT],
+        mask: ActionMask,
+        is_on: bool,
+    ) -> Option<(Action, LookAheadRecord)>;
+
+    /// The channel as estimated in this mission; `None` before the first decision and without look-ahead.
+    fn channel(&self) -> Option<ChannelEstimate>;
+}
+
+impl<P: Policy> Deliberator for P {
+    const LOOKS_AHEAD: bool = false;
+
+    fn infer(&mut self, tokens: &Tokens) -> Option<Inference> {
+        Policy::infer(self, tokens).ok()
+    }
+
+    fn begin(&mut self, _: Option<&dyn Sight>, _: impl Iterator<Item = DeviceState>, _: u32) {}
+
+    fn propose(
+        &mut self,
+        _: &Place<'_>,
+        _: impl Iterator<Item = DeviceState>,
+        _: &[f32; Action::COUNT],
+        _: ActionMask,
+        _: bool,
+    ) -> Option<(Action, LookAheadRecord)> {
+        None
+    }
+
+    fn channel(&self) -> Option<ChannelEstimate> {
+        None
+    }
+}
+
+/// A network with look-ahead, for missions of up to [`MAX_DEVICES`] devices: 27 kilobytes beside the network.
+#[derive(Clone, Debug)]
+pub struct LookingAhead<P> {
+    policy: P,
+    lookahead: LookAhead<MAX_DEVICES>,
+    devices: Vec<DeviceState, MAX_DEVICES>,
+    budget: Budget,
+    seed: u32,
+    slot: u16,
+}
+
+impl<P> LookingAhead<P> {
+    /// Looks ahead with the nominal channel as prior and this budget per decision.
+    #[must_use]
+    pub fn new(policy: P, budget: Budget) -> LookingAhead<P> {
+        let lookahead = LookAhead::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
+        LookingAhead { policy, lookahead, devices: Vec::new(), budget, seed: 0, slot: 0 }
+    }
+
+    /// The network.
+    #[must_use]
+    pub const fn network(&self) -> &P {
+        &self.policy
+    }
+
+    /// Changes the budget of the decisions to come.
+    pub const fn set_budget(&mut self, budget: Budget) {
+        self.budget = budget;
+    }
+
+    /// The planner, for example for [`LookAhead::what_if`].
+    #[must_use]
+    pub const fn planner(&self) -> &LookAhead<MAX_DEVICES> {
+        &self.lookahead
+    }
+}
+
+impl<P: Policy> Deliberator for LookingAhead<P> {
+    const LOOKS_AHEAD: bool = true;
+
+    fn infer(&mut self, tokens: &Tokens) -> Option<Inference> {
+        self.policy.infer(tokens).ok()
+    }
+
+    fn begin(&mut self, sight: Option<&dyn Sight>, devices: impl Iterator<Item = DeviceState>, seed: u32) {
+        // A mission holds no more devices than this.
+        self.devices = devices.take(MAX_DEVICES).collect();
+        self.lookahead.begin(sight, &self.devices, seed.into());
+        (self.seed, self.slot) = (seed, 0);
+    }
+
+    fn propose(
+        &mut self,
+        place: &Place<'_>,
+        devices: impl Iterator<Item = DeviceState>,
+        logits: &[f32; Action::COUNT],
+        mask: ActionMask,
+        is_on: bool,
+    ) -> Option<(Action, LookAheadRecord)> {
+        self.devices = devices.take(MAX_DEVICES).collect();
+        let &Place { cell, battery, preference, guard } = place;
+        let view = View { cell, battery, preference, guard, devices: &self.devices };
+        let budget = if is_on { self.budget } else { Budget::NONE };
+        let choice = self.lookahead.propose(&view, logits, mask, budget);
+        let slot = self.slot;
+        self.slot = slot.saturating_add(1);
+        let choice = choice?;
+        let record = LookAheadRecord {
+            source: choice.source,
+            expected: choice.expected,
+            budget: budget.tours,
+            tours: choice.tours,
+            seed: self.seed,
+            slot,
+            channel: self.lookahead.fit().estimate(),
+        };
+        Some((choice.action, record))
+    }
+
+    fn channel(&self) -> Option<ChannelEstimate> {
+        (self.slot > 0).then(|| self.lookahead.fit().estimate())
+    }
+}

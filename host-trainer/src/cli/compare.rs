@@ -1,0 +1,99 @@
+//! `gleaner-train compare`: the table of mismatches.
+
+use super::oracle::{bar, known, plan, read_or_shipped};
+use anyhow::{Context, Result};
+use gleaner_host_trainer::judge::comparison::{Arena, HEADING, ROWS, Row};
+use gleaner_host_trainer::judge::paper::Setting;
+use gleaner_host_trainer::planner::Rates;
+use gleaner_host_trainer::planner::oracle::Thoroughness;
+use gleaner_lookahead::Budget;
+use gleaner_policy::{Engine, EngineKind};
+use gleaner_world::ScenarioKind;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// An ONNX model, flown in the native engine.
+    #[arg(long, value_name = "FILE", default_value = "models/gleaner.onnx")]
+    model: PathBuf,
+    /// Evaluation realizations, numbers 0 to N - 1.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    realizations: u64,
+    /// Tours per decision of the look-ahead.
+    #[arg(long, default_value_t = Budget::LINUX.tours)]
+    tours: u32,
+    /// Tours per search of the oracle; 0 leaves the oracle out. In a world whose channel is nominal it comes from
+    /// `models/oracle.jsonl` where that file has these missions.
+    #[arg(long, default_value_t = 20_000)]
+    oracle: u32,
+    /// Only these rows: nominal, noise+3, noise+6, noise-6, exponents+0.3, fading, reports-10%, buildings-10%,
+    /// heights-10m, no-map.
+    #[arg(long, value_name = "ROW", value_parser = row)]
+    row: Vec<Row>,
+    /// Only this scenario.
+    #[arg(long, value_parser = super::scenario::parse)]
+    scenario: Option<ScenarioKind>,
+    /// Number of devices, K.
+    #[arg(long, default_value_t = 6)]
+    devices: usize,
+    /// Battery units at the start, B.
+    #[arg(long, default_value_t = 80)]
+    battery: u16,
+    /// Print one JSON object a row, with the data of each mission.
+    #[arg(long)]
+    json: bool,
+}
+
+fn row(name: &str) -> Result<Row, String> {
+    let names = || ROWS.map(|row| row.name).join(", ");
+    ROWS.into_iter().find(|row| row.name == name).ok_or_else(|| format!("use one of {}", names()))
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    let place = || arguments.model.display().to_string();
+    let bytes = std::fs::read(&arguments.model).with_context(place)?;
+    let mut policy = Engine::load_checked(&bytes, EngineKind::Native).with_context(place)?;
+    let budget = Budget { tours: arguments.tours };
+    let rows = if arguments.row.is_empty() { ROWS.to_vec() } else { arguments.row.clone() };
+    if !arguments.json {
+        println!("{HEADING}");
+    }
+    for row in rows {
+        for kind in ScenarioKind::ALL {
+            if arguments.scenario.is_some_and(|only| only != kind) {
+                continue;
+            }
+            let setting = Setting { kind, devices: arguments.devices, battery: arguments.battery };
+            let arena = Arena::new(row, setting, arguments.realizations)?;
+            let mut compared = arena.compare(&mut policy, budget)?;
+            compared.oracle = oracle(arguments, &arena, row, setting)?;
+            if arguments.json {
+                println!("{}", serde_json::to_string(&compared)?);
+            } else {
+                println!("{compared}");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The oracle's data of each mission, percent.
+fn oracle(arguments: &Arguments, arena: &Arena, row: Row, setting: Setting) -> Result<Vec<f32>> {
+    if arguments.oracle == 0 {
+        return Ok(Vec::new());
+    }
+    let known = match row.mismatch.channel_is_nominal() {
+        true => known(&read_or_shipped(None)?, setting, arguments.realizations),
+        false => None,
+    };
+    let missions = known.map_or_else(
+        || {
+            let rates = Rates::new(Arc::clone(&arena.world));
+            let thoroughness = Thoroughness { tours: arguments.oracle };
+            plan(&rates, &arena.drawn, thoroughness, &bar(&arena.drawn, "oracle".into()))
+        },
+        |known| known.missions,
+    );
+    Ok(missions.0.last().into_iter().flatten().map(|reward| reward[0]).collect())
+}
