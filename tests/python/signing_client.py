@@ -7,8 +7,12 @@ that is not as the MAVLink guide says.
 """
 
 import hashlib
+import os
 import sys
 import time
+
+# Read by pymavlink when it is imported: a station that signs speaks MAVLink 2 from its first frame.
+os.environ["MAVLINK20"] = "1"
 
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mav

@@ -86,7 +86,7 @@ fn pymavlink_accepts_our_signatures_and_we_accept_its() {
     while !client.is_finished() {
         port.turn();
     }
-    client.join().unwrap().unwrap_or_else(|cause| panic!("{cause:#}"));
+    client.join().unwrap().unwrap_or_else(|cause| panic!("{cause:#}\n{:?}", port.signing.stats()));
     let SigningStats { replayed, unsigned, wrong, .. } = port.signing.stats();
     assert_eq!((replayed, unsigned, wrong), (1, 1, 1));
     assert_eq!(port.component.parameters().data_weight(), 1.0, "only the signed commands counted");
