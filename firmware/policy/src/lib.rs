@@ -35,6 +35,8 @@ pub mod native;
 mod outlook;
 pub mod schema;
 mod situation;
+#[cfg(all(test, feature = "std"))]
+mod testing;
 mod timed;
 mod tokens;
 mod vantage;

@@ -137,7 +137,7 @@ fn refusal(bytes: &[u8]) -> ModelError {
     }
 }
 
-/// The file with one metadata entry changed, or removed, and sealed again by hand.
+/// The file with one metadata entry changed or removed, and a correct seal.
 fn with_entry(key: &str, value: Option<&str>) -> Vec<u8> {
     use sha2::{Digest, Sha256};
     let mut model = ModelProto::decode(&FILE[..]).unwrap();

@@ -9,12 +9,15 @@
 //! - **panel**: the weights of neighbouring outputs of a linear layer, `[inputs][outputs]`, so that the kernel reads them
 //!   in order.
 //!
-//! # Two implementations, and which one is exact
-//! - [`NativePolicy`] is portable and **bit-exact**: every output is the same chain of additions and multiplications on
-//!   every machine, so a microcontroller and a host give the same bits.
-//! - `SimdPolicy` (feature `std`) uses the host's vector unit, fused multiply-adds and repacked weights. Its logits agree
-//!   with [`NativePolicy`] within 1e-5, and its masked decisions on the 110,000 test observations are the same. It is not
-//!   bit-exact. Use [`NativePolicy`] to compare a host with a board.
+//! # Two implementations, the same bits
+//! - [`NativePolicy`] is portable: each number is a fixed chain of rounded operations, so every machine gives the same
+//!   bits. Microcontrollers use it.
+//! - `SimdPolicy` (feature `std`) computes the same chains on the host's vector unit. Its logits and its attention are
+//!   equal to those of [`NativePolicy`] in every bit, so a host and a board decide alike. It does without fused
+//!   multiply-adds and without sums in several parts, which round differently.
+//!
+//! tract and the trainer round differently. Their logits agree within [`crate::GOLDEN_TOLERANCE`], and their masked
+//! decisions are the same on the 110,000 observations of `tests/tests/native_engine.rs`.
 //!
 //! # When you may trust it
 //! [`Model::read`] checks that a blob is complete and has this program's observation contract. [`crate::self_test`] with

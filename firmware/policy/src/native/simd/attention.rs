@@ -5,6 +5,7 @@
 )]
 
 use super::QKV;
+use super::exponential::exp;
 use crate::native::shape::{HEAD_WIDTH, HEADS, WIDTH};
 use crate::{Attention, TOKENS};
 use core::array;
@@ -95,7 +96,8 @@ impl Attend<'_> {
                 for key in 0..KEYS {
                     let number = simd.splat_f32s(keys[key][feature]);
                     for vector in 0..VECTORS {
-                        sums[key][vector] = simd.mul_add_e_f32s(query[vector], number, sums[key][vector]);
+                        let product = simd.mul_f32s(query[vector], number);
+                        sums[key][vector] = simd.add_f32s(sums[key][vector], product);
                     }
                 }
             }
@@ -113,8 +115,8 @@ impl Attend<'_> {
                 for query in 0..KEYS {
                     let weight = simd.splat_f32s(weights[first + query]);
                     for vector in 0..VECTORS {
-                        sums[query][vector] =
-                            simd.mul_add_e_f32s(values[vector], weight, sums[query][vector]);
+                        let product = simd.mul_f32s(values[vector], weight);
+                        sums[query][vector] = simd.add_f32s(sums[query][vector], product);
                     }
                 }
             }
@@ -159,31 +161,4 @@ fn softmax<S: Simd, const VECTORS: usize>(simd: S, rows: &mut [[S::f32s; VECTORS
             row[vector] = simd.mul_f32s(row[vector], inverse[vector]);
         }
     }
-}
-
-/// `e^x` for x <= 0, within two units in the last place; below -87 the result is `e^-87`.
-///
-/// Cody and Waite's reduction to `2^n e^r` with `|r| <= ln 2 / 2`, and the polynomial of Cephes' `expf`.
-#[inline(always)]
-fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
-    // 1.5 x 2^23: the sum's low bits are x / ln 2 rounded to a whole number.
-    const ROUND: f32 = 12_582_912.0;
-    const LN_2_HIGH: f32 = 0.693_359_4;
-    const LN_2_LOW: f32 = -2.121_944_4e-4;
-    const POLYNOMIAL: [f32; 5] = [1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.500_000_06];
-    let splat = |number: f32| simd.splat_f32s(number);
-    // In this order NaN stays NaN.
-    let x = simd.max_f32s(splat(-87.0), x);
-    let shifted = simd.mul_add_e_f32s(x, splat(core::f32::consts::LOG2_E), splat(ROUND));
-    let n = simd.sub_f32s(shifted, splat(ROUND));
-    let r = simd.mul_add_e_f32s(n, splat(-LN_2_HIGH), x);
-    let r = simd.mul_add_e_f32s(n, splat(-LN_2_LOW), r);
-    let mut sum = splat(1.987_569_1e-4);
-    for coefficient in POLYNOMIAL {
-        sum = simd.mul_add_e_f32s(sum, r, splat(coefficient));
-    }
-    let sum = simd.mul_add_e_f32s(sum, simd.mul_f32s(r, r), simd.add_f32s(r, splat(1.0)));
-    let exponent = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(23));
-    let scale = simd.add_u32s(exponent, simd.splat_u32s(1.0_f32.to_bits()));
-    simd.mul_f32s(sum, simd.transmute_f32s_u32s(scale))
 }

@@ -1,15 +1,14 @@
 //! The engine for hosts: the same network on the processor's vector unit.
 //!
-//! [`pulp`] selects the instruction set at run time (AVX2 with FMA, AVX-512 or NEON), so one binary runs everywhere and
-//! no `unsafe` code is needed here. Three things differ from the portable engine, and all change the rounding of the last
-//! bits:
+//! [`pulp`] selects the instruction set at run time (AVX2, AVX-512 or NEON), so one binary runs everywhere and no `unsafe`
+//! code is needed here.
 //!
-//! - multiply-adds are fused;
-//! - the projection of a token and the first layer's query, key and value are composed into one layer at load time,
-//!   because nothing non-linear lies between them. A device then costs 7 x 192 multiply-adds there instead of 64 x 192;
-//! - exponentials come from a polynomial for vectors.
+//! Its results have the bits of the portable engine, and so of a microcontroller: each number is the same chain of
+//! rounded operations. Vector lanes hold different outputs or different tokens, never parts of one sum, and
+//! multiply-adds are not fused.
 
 mod attention;
+mod exponential;
 mod kernel;
 mod numbers;
 mod pack;
@@ -33,7 +32,7 @@ const SPARE_ROWS: usize = 8;
 /// Query, key and value of a token.
 const QKV: usize = 3 * WIDTH;
 
-/// The engine for hosts with a vector unit. Not bit-exact with a board: see the module's page.
+/// The engine for hosts with a vector unit: the bits of [`super::NativePolicy`] in a fraction of the time.
 pub struct SimdPolicy {
     arch: Arch,
     weights: Box<Weights>,
@@ -188,12 +187,9 @@ impl WithSimd for Forward<'_> {
         let rows = self.batch.iter().map(present).sum();
         self.embed(simd);
         let [first, last] = &self.weights.encoder;
-        self.attend(simd, false);
+        self.attend(simd, first, rows, false);
         self.finish_layer(simd, first, rows);
-        let Work { tokens, qkv, .. } = &mut *self.work;
-        let (tokens, qkv) = (tokens.first(rows * WIDTH), qkv.first_mut(rows * QKV));
-        simd.vectorize(Multiply::<STORE> { layer: &last.qkv, x: tokens, y: qkv });
-        self.attend(simd, true);
+        self.attend(simd, last, rows, true);
         self.finish_layer(simd, last, rows);
         self.join();
         let (observations, width) = (self.batch.len(), self.weights.logits.outputs());
@@ -212,18 +208,14 @@ impl WithSimd for Forward<'_> {
 }
 
 impl Forward<'_> {
-    /// Each token, and its query, key and value in the first layer.
+    /// Normalises and projects each token into its row.
     #[inline(always)]
     fn embed<S: Simd>(&mut self, simd: S) {
-        let Work { tokens, qkv, .. } = &mut *self.work;
-        let (mut tokens, mut qkv) = (tokens.all_mut(), qkv.all_mut());
-        let mut project = |[token, attention]: &[Packed; 2], x: &[f32], rows: usize| {
-            let (token_rows, rest) = core::mem::take(&mut tokens).split_at_mut(rows * WIDTH);
+        let mut tokens = self.work.tokens.all_mut();
+        let mut project = |layer: &Packed, x: &[f32], rows: usize| {
+            let (y, rest) = core::mem::take(&mut tokens).split_at_mut(rows * WIDTH);
             tokens = rest;
-            let (qkv_rows, rest) = core::mem::take(&mut qkv).split_at_mut(rows * QKV);
-            qkv = rest;
-            simd.vectorize(Multiply::<STORE> { layer: token, x, y: token_rows });
-            simd.vectorize(Multiply::<STORE> { layer: attention, x, y: qkv_rows });
+            simd.vectorize(Multiply::<STORE> { layer, x, y });
         };
         for observation in self.batch {
             project(&self.weights.uav, &normalise(&observation.uav, &UAV_NORMALISATIONS), 1);
@@ -244,9 +236,12 @@ impl Forward<'_> {
         }
     }
 
+    /// Query, key and value of each token, and the attention of each observation.
     #[inline(always)]
-    fn attend<S: Simd>(&mut self, simd: S, is_last: bool) {
-        let Work { qkv, mixed, attention: scratch, .. } = &mut *self.work;
+    fn attend<S: Simd>(&mut self, simd: S, layer: &pack::Encoder, rows: usize, is_last: bool) {
+        let Work { tokens, qkv, mixed, attention: scratch, .. } = &mut *self.work;
+        let x = tokens.first(rows * WIDTH);
+        simd.vectorize(Multiply::<STORE> { layer: &layer.qkv, x, y: qkv.first_mut(rows * QKV) });
         let (mut qkv, mut mixed) = (qkv.all(), mixed.all_mut());
         for (index, observation) in self.batch.iter().enumerate() {
             let tokens = present(observation);
@@ -291,6 +286,39 @@ impl Forward<'_> {
             for device in devices {
                 for (largest, number) in pooled.iter_mut().zip(device) {
                     *largest = if *largest > *number { *largest } else { *number };
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::native::{AlignedBytes, Model, NativePolicy, WeightFormat, Workspace};
+    use crate::onnx::convert;
+    use crate::testing::observations;
+
+    #[test]
+    fn bits_are_those_of_the_portable_engine() {
+        let onnx = std::fs::read("../../models/gleaner.onnx").expect("the shipped model");
+        for format in WeightFormat::ALL {
+            let blob = AlignedBytes::new(&convert(&onnx, format).expect("a model that can be converted"));
+            let model = Model::read(blob.as_slice()).expect("a valid blob");
+            let mut workspace = Workspace::new();
+            let mut portable = NativePolicy::new(model, &mut workspace);
+            let mut simd = SimdPolicy::new(&model).expect("tests run where there is a vector unit");
+            for batch in observations(1300).chunks(7) {
+                let together = simd.logits_of(batch).expect("logits");
+                for (tokens, together) in batch.iter().zip(together) {
+                    let exact = portable.infer(tokens).expect("logits");
+                    assert_eq!(
+                        simd.infer(tokens).expect("logits"),
+                        exact,
+                        "{} devices",
+                        tokens.devices.len()
+                    );
+                    assert_eq!(together, exact.logits);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! The model's weights, composed and repacked for vector registers.
+//! The model's weights, repacked for vector registers.
 
 use super::numbers::Numbers;
 use crate::native::model::{self, Model};
@@ -11,7 +11,10 @@ pub(super) const VECTORS: usize = 2;
 /// A linear layer in panels: `[panels][inputs][VECTORS * lanes]`. Outputs are padded with zeros to whole panels.
 pub(super) struct Packed {
     pub inputs: usize,
+    /// Of each output; 1 for 32-bit weights.
+    pub scale: Numbers,
     pub bias: Numbers,
+    /// Before the scale.
     pub weights: Numbers,
 }
 
@@ -29,22 +32,21 @@ impl Packed {
     fn new(layer: &Dense, lanes: usize) -> Packed {
         let width = VECTORS * lanes;
         let outputs = Packed::padded(layer.bias.len(), lanes);
-        let mut bias = Numbers::zeros(outputs);
-        for (place, number) in bias.all_mut().iter_mut().zip(&layer.bias) {
-            *place = *number as f32;
-        }
+        let (mut scale, mut bias) = (Numbers::zeros(outputs), Numbers::zeros(outputs));
+        scale.first_mut(layer.scale.len()).copy_from_slice(&layer.scale);
+        bias.first_mut(layer.bias.len()).copy_from_slice(&layer.bias);
         let mut weights = Numbers::zeros(outputs * layer.inputs);
         let panels = weights.all_mut().chunks_exact_mut(layer.inputs * width);
         for (panel, rows) in panels.zip(layer.weight.chunks(layer.inputs * width)) {
             for (output, row) in rows.chunks_exact(layer.inputs).enumerate() {
                 for (places, weight) in panel.chunks_exact_mut(width).zip(row) {
                     if let Some(place) = places.get_mut(output) {
-                        *place = *weight as f32;
+                        *place = *weight;
                     }
                 }
             }
         }
-        Packed { inputs: layer.inputs, bias, weights }
+        Packed { inputs: layer.inputs, scale, bias, weights }
     }
 }
 
@@ -75,15 +77,14 @@ pub(super) struct Encoder {
     pub norm2: Norm,
 }
 
-/// The whole network. Each kind of token has two layers: its projection, and that composed with the first layer's query,
-/// key and value.
+/// The whole network.
 pub(super) struct Weights {
     /// Lanes of the registers that the weights are packed for.
     pub lanes: usize,
-    pub uav: [Packed; 2],
-    pub preference: [Packed; 2],
-    pub map: [Packed; 2],
-    pub device: [Packed; 2],
+    pub uav: Packed,
+    pub preference: Packed,
+    pub map: Packed,
+    pub device: Packed,
     pub encoder: [Encoder; 2],
     pub head: Packed,
     pub logits: Packed,
@@ -98,40 +99,35 @@ impl Weights {
     }
 
     fn pack<W: Stored>(network: &Network<'_, W>, lanes: usize) -> Weights {
-        let [first, last] = &network.encoder;
-        let qkv = [first, last].map(|layer| Dense::new(&layer.query).beside(Dense::new(&layer.key_value)));
-        let token = |projection: Dense| {
-            let [first, _] = &qkv;
-            [Packed::new(&projection, lanes), Packed::new(&first.after(&projection), lanes)]
-        };
         let packed = |layer: Dense| Packed::new(&layer, lanes);
-        let encoder = |layer: &network::Encoder<'_, W>, qkv: &Dense| Encoder {
-            qkv: Packed::new(qkv, lanes),
+        let encoder = |layer: &network::Encoder<'_, W>| Encoder {
+            qkv: packed(Dense::new(&layer.query).beside(Dense::new(&layer.key_value))),
             out: packed(Dense::new(&layer.out)),
             norm1: Norm::new(&layer.norm1),
             ff1: packed(Dense::new(&layer.ff1)),
             ff2: packed(Dense::new(&layer.ff2)),
             norm2: Norm::new(&layer.norm2),
         };
-        let [first_qkv, last_qkv] = &qkv;
+        let [first, last] = &network.encoder;
         Weights {
             lanes,
-            uav: token(Dense::new(&network.project_uav)),
-            preference: token(Dense::new(&network.project_preference)),
-            map: token(Dense::new(&network.project_map)),
-            device: token(Dense::new(&network.project_device)),
-            encoder: [encoder(first, first_qkv), encoder(last, last_qkv)],
+            uav: packed(Dense::new(&network.project_uav)),
+            preference: packed(Dense::new(&network.project_preference)),
+            map: packed(Dense::new(&network.project_map)),
+            device: packed(Dense::new(&network.project_device)),
+            encoder: [encoder(first), encoder(last)],
             head: packed(Dense::new(&network.head)),
             logits: packed(Dense::new(&network.logits)),
         }
     }
 }
 
-/// A linear layer `y = W x + b` in double precision, `W` row by row.
+/// A linear layer `y = scale W x + b`, `W` row by row.
 struct Dense {
     inputs: usize,
-    weight: Vec<f64>,
-    bias: Vec<f64>,
+    weight: Vec<f32>,
+    scale: Vec<f32>,
+    bias: Vec<f32>,
 }
 
 impl Dense {
@@ -139,42 +135,21 @@ impl Dense {
         layer: &network::Linear<'_, W, INPUTS, PANELS>,
     ) -> Dense {
         let mut weight = Vec::with_capacity(PANELS * PANEL * INPUTS);
-        for (panel, scale) in layer.weight.iter().zip(layer.scale) {
-            for (output, scale) in scale.iter().enumerate() {
-                weight.extend(panel.iter().map(|weights| {
-                    let weights = weights.widen();
-                    f64::from(weights.get(output).copied().unwrap_or_default()) * f64::from(*scale)
-                }));
+        for panel in layer.weight {
+            for output in 0..PANEL {
+                let weights = panel.iter().map(|weights| weights.widen());
+                weight.extend(weights.map(|weights| weights.get(output).copied().unwrap_or_default()));
             }
         }
-        let bias = layer.bias.as_flattened().iter().copied().map(f64::from).collect();
-        Dense { inputs: INPUTS, weight, bias }
+        let [scale, bias] = [layer.scale, layer.bias].map(|numbers| numbers.as_flattened().to_vec());
+        Dense { inputs: INPUTS, weight, scale, bias }
     }
 
     /// Both layers on the same input: the outputs of `other` after these.
     fn beside(mut self, other: Dense) -> Dense {
         self.weight.extend(other.weight);
+        self.scale.extend(other.scale);
         self.bias.extend(other.bias);
         self
-    }
-
-    /// This layer applied to the output of `inner`.
-    fn after(&self, inner: &Dense) -> Dense {
-        let mut composed = Dense { inputs: inner.inputs, weight: Vec::new(), bias: Vec::new() };
-        for (row, bias) in self.weight.chunks_exact(self.inputs).zip(&self.bias) {
-            let mut outer = vec![0.0; inner.inputs];
-            let mut sum = *bias;
-            for ((weight, inner_row), inner_bias) in
-                row.iter().zip(inner.weight.chunks_exact(inner.inputs)).zip(&inner.bias)
-            {
-                sum += weight * inner_bias;
-                for (outer, inner) in outer.iter_mut().zip(inner_row) {
-                    *outer += weight * inner;
-                }
-            }
-            composed.weight.extend(outer);
-            composed.bias.push(sum);
-        }
-        composed
     }
 }
