@@ -99,3 +99,21 @@ fn trainer_and_aircraft_share_observation_builder_and_mask() {
         assert!(edges.contains(&(user.into(), owner.into())), "{user} does not use {owner}");
     }
 }
+
+/// `cargo run --release` flies the native engine; tract would multiply the time of a newcomer's first build.
+#[test]
+fn the_demo_is_built_without_tract() {
+    let crates = |features: &[&str]| {
+        let output = Command::new(env!("CARGO"))
+            .args(["tree", "-p", "gleaner-harness", "-e", "normal,build", "--prefix", "none"])
+            .args(features)
+            .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let has_tract = |tree: &str| tree.lines().any(|line| line.starts_with("tract"));
+    assert!(has_tract(&crates(&["--features", "tract"])), "cargo tree was not understood");
+    assert!(!has_tract(&crates(&[])));
+}

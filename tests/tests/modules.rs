@@ -10,7 +10,7 @@ use std::path::Path;
 const MOST_LINES: usize = 400;
 
 /// Crates that still have circles, and at most how many. Lower the numbers, never raise them.
-const CIRCLES_LEFT: [(&str, usize); 2] = [("firmware/policy", 2), ("firmware/companion", 1)];
+const CIRCLES_LEFT: [(&str, usize); 1] = [("firmware/companion", 1)];
 
 /// Files that are still too long. Remove lines, never add any.
 const LONG_FILES_LEFT: [&str; 0] = [];
