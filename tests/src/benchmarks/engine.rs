@@ -1,6 +1,6 @@
 //! The policy on board: inference in each engine, and the observation.
 
-use super::timing::in_turns;
+use super::timing::{Contender, in_turns};
 use crate::observations::random;
 use crate::programs::repository;
 use crate::python;
@@ -13,12 +13,15 @@ use gleaner_units::{BatteryUnits, Cell, CellSet, Db};
 use gleaner_world::City;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use std::cell::RefCell;
 use std::fmt::Write;
 use std::hint::black_box;
 
 const DEVICES: [usize; 3] = [1, 6, 12];
 const REPETITIONS: usize = 200;
 const CALLS: usize = 10;
+/// Other data between two inferences, bytes: more than the second-level cache holds.
+const COLD_BYTES: usize = 4 << 20;
 /// Observations of a batch.
 const BATCH: usize = 32;
 
@@ -33,68 +36,114 @@ pub(super) fn inference(page: &mut String) -> Result<()> {
     let onnx = std::fs::read(&path).context("models/gleaner.onnx cannot be read")?;
     let blob = AlignedBytes::new(&convert(&onnx, WeightFormat::F32)?);
     let model = Model::read(blob.as_slice())?;
-    let mut simd = SimdPolicy::new(&model).context("this processor has no supported vector unit")?;
-    let mut batched = SimdPolicy::new(&model).context("as above")?;
-    let (mut workspace, mut second) = (Workspace::new(), Workspace::new());
-    let mut portable = NativePolicy::new(model, &mut workspace);
-    let mut alone = NativePolicy::new(model, &mut second);
-    let mut tract = TractPolicy::load_checked(&onnx)?;
+    let simd = SimdPolicy::new(&model).context("this processor has no supported vector unit")?;
+    let mut workspace = Workspace::new();
+    let mut engines = Engines {
+        simd,
+        portable: NativePolicy::new(model, &mut workspace),
+        tract: TractPolicy::load_checked(&onnx)?,
+    };
     let calls = (REPETITIONS * CALLS).to_string();
     let mut arguments = vec![path.display().to_string(), calls];
     arguments.extend(DEVICES.map(|devices| devices.to_string()));
     let runtime = python::run("onnxruntime_bench.py", arguments)?;
-    let mut runtime = runtime.lines();
     writeln!(
         page,
-        "## Inference\n\nThe shipped model, one observation at a time, one thread; the vectorised engine uses {}. \
-         onnxruntime runs from Python, directly before. The batch row is the time of one of {BATCH} observations.\n",
-        simd.instruction_set()
+        "## Inference\n\nThe shipped model on one thread, the vectorised engine with {}. Each repetition is {CALLS} calls. \
+         onnxruntime runs from Python, directly before. The row of the batch is the time of one of {BATCH} observations.\n",
+        engines.simd.instruction_set()
     )?;
     writeln!(page, "| devices | engine | time | tract / engine |\n|---|---|---|---|")?;
+    let mut lines = runtime.lines();
+    let mut vectorised = Vec::new();
     for devices in DEVICES {
         let tokens = sample(devices)?;
-        let batch = vec![tokens.clone(); BATCH];
-        let by_itself = in_turns(
-            &mut [("portable", Box::new(|| drop(black_box(alone.infer(black_box(&tokens))))))],
-            REPETITIONS,
-            CALLS,
-        );
-        let mut contenders: [super::timing::Contender<'_>; 4] = [
-            (
-                "native, vectorised",
-                Box::new(|| {
-                    let _ = black_box(simd.logits(black_box(&tokens)));
-                }),
-            ),
-            ("native, vectorised, batch", Box::new(|| drop(black_box(batched.logits_of(black_box(&batch)))))),
-            ("native, portable", Box::new(|| drop(black_box(portable.infer(black_box(&tokens)))))),
-            ("tract", Box::new(|| drop(black_box(tract.infer(black_box(&tokens)))))),
-        ];
-        let mut times = in_turns(&mut contenders, REPETITIONS, CALLS);
-        let names = contenders.iter().map(|(name, _)| *name).collect::<Vec<_>>();
-        times[1].divide(BATCH as f64);
-        let peer = times.last().context("four contenders")?;
-        for (name, times) in names.iter().zip(&times) {
-            writeln!(page, "| {devices} | {name} | {} | {} |", times.text(), times.ratio(peer))?;
-        }
-        writeln!(
-            page,
-            "| {devices} | native, portable, no other engine between | {} | |",
-            by_itself[0].text()
-        )?;
-        let line = runtime.next().context("onnxruntime_bench.py printed too little")?;
+        let line = lines.next().context("onnxruntime_bench.py printed too little")?;
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|number| number.parse().ok()).collect();
         let [_, minimum, median] = numbers[..] else {
             anyhow::bail!("onnxruntime_bench.py printed `{line}`")
         };
+        let [ours, peer] = engines.alone(page, &tokens)?;
         writeln!(
             page,
-            "| {devices} | onnxruntime | {median:.1} us (minimum {minimum:.1}) | {:.2}; / vectorised {:.2} |",
-            peer.median() / median,
-            median / times[0].median()
+            "| {devices} | onnxruntime | {median:.1} us (minimum {minimum:.1}) | {:.2}; onnxruntime / vectorised {:.2} |",
+            peer / median,
+            median / ours
         )?;
+        vectorised.push(ours);
+    }
+    writeln!(
+        page,
+        "\nThe vectorised engine with cold caches, as in flight, where a decision is due every two seconds:\n\n\
+         | devices | before each inference | time | times the time above |\n|---|---|---|---|"
+    )?;
+    for (devices, warm) in DEVICES.into_iter().zip(vectorised) {
+        engines.cold(page, &sample(devices)?, warm)?;
     }
     Ok(())
+}
+
+/// The engines with the shipped model.
+struct Engines<'a> {
+    simd: SimdPolicy,
+    portable: NativePolicy<'a>,
+    tract: TractPolicy,
+}
+
+impl Engines<'_> {
+    /// Each engine in repetitions of its own calls, in turns. Returns the medians of the vectorised engine and of tract.
+    fn alone(&mut self, page: &mut String, tokens: &Tokens) -> Result<[f64; 2]> {
+        let devices = tokens.devices.len();
+        let batch = vec![tokens.clone(); BATCH];
+        let simd = RefCell::new(&mut self.simd);
+        let mut contenders: [Contender<'_>; 4] = [
+            (
+                "native, vectorised",
+                Box::new(|| {
+                    let _ = black_box(simd.borrow_mut().logits(black_box(tokens)));
+                }),
+            ),
+            (
+                "native, vectorised, batch",
+                Box::new(|| drop(black_box(simd.borrow_mut().logits_of(black_box(&batch))))),
+            ),
+            ("native, portable", Box::new(|| drop(black_box(self.portable.infer(black_box(tokens)))))),
+            ("tract", Box::new(|| drop(black_box(self.tract.infer(black_box(tokens)))))),
+        ];
+        let mut times = in_turns(&mut contenders, REPETITIONS, CALLS);
+        times[1].divide(BATCH as f64);
+        let peer = times.last().context("four contenders")?;
+        for ((name, _), times) in contenders.iter().zip(&times) {
+            writeln!(page, "| {devices} | {name} | {} | {} |", times.text(), times.ratio(peer))?;
+        }
+        Ok([times[0].median(), peer.median()])
+    }
+
+    /// The vectorised engine after a pass over other memory, and after an inference of tract.
+    fn cold(&mut self, page: &mut String, tokens: &Tokens, warm: f64) -> Result<()> {
+        let devices = tokens.devices.len();
+        let mut memory = vec![0_u8; COLD_BYTES];
+        let name = format!("a pass over {} MiB of other memory", COLD_BYTES >> 20);
+        let mut pass = || black_box(&mut memory).iter_mut().for_each(|byte| *byte = byte.wrapping_add(1));
+        let mut tract = || drop(black_box(self.tract.infer(black_box(tokens))));
+        let before: [(&str, &mut dyn FnMut()); 2] =
+            [(&name, &mut pass), ("an inference of tract on the same observation", &mut tract)];
+        for (name, before) in before {
+            let simd = &mut self.simd;
+            let mut contenders: [Contender<'_>; 2] = [
+                ("before", Box::new(before)),
+                (
+                    "native",
+                    Box::new(|| {
+                        let _ = black_box(simd.logits(black_box(tokens)));
+                    }),
+                ),
+            ];
+            let times = in_turns(&mut contenders, REPETITIONS, 1);
+            writeln!(page, "| {devices} | {name} | {} | {:.1} |", times[1].text(), times[1].median() / warm)?;
+        }
+        Ok(())
+    }
 }
 
 /// Tokens and mask of one decision, along a flight across the default city.
@@ -128,7 +177,7 @@ pub(super) fn observation(page: &mut String) -> Result<()> {
             })
         };
         let mask = |situation: &Situation<'_>| guard.mask(situation.cell, situation.battery);
-        let mut contenders: [super::timing::Contender<'_>; 2] = [
+        let mut contenders: [Contender<'_>; 2] = [
             (
                 "`TokenTable`",
                 Box::new(|| {

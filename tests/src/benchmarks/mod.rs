@@ -6,8 +6,13 @@
 //! - **spread**: the quartiles of the ratios of paired repetitions.
 
 mod engine;
+mod golden;
+mod learning;
 mod machine;
+mod programs;
 mod timing;
+mod wire;
+mod world;
 
 use anyhow::{Context, Result, bail};
 use std::fmt::Write;
@@ -16,7 +21,15 @@ use std::fs;
 /// Name and function of each part.
 type Part = (&'static str, fn(&mut String) -> Result<()>);
 
-const PARTS: [Part; 2] = [("engine", engine::inference), ("observation", engine::observation)];
+const PARTS: [Part; 7] = [
+    ("engine", engine::inference),
+    ("observation", engine::observation),
+    ("world", world::steps),
+    ("learning", learning::updates),
+    ("wire", wire::packets),
+    ("programs", programs::programs),
+    ("sweep", programs::sweep),
+];
 const FILE: &str = "docs/benchmarks.md";
 
 /// Measures the named parts, all if none is named. Prints them, and writes the file if all were measured.

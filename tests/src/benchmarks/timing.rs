@@ -6,6 +6,11 @@ use std::time::Instant;
 pub(super) struct Times(Vec<f64>);
 
 impl Times {
+    /// Times that a peer measured, microseconds.
+    pub fn from_micros(micros: Vec<f64>) -> Times {
+        Times(micros)
+    }
+
     /// Divides each time by the number of items that a call processes.
     pub fn divide(&mut self, items: f64) {
         self.0.iter_mut().for_each(|time| *time /= items);
@@ -23,7 +28,12 @@ impl Times {
 
     /// `12.3 us (minimum 11.8)`.
     pub fn text(&self) -> String {
-        format!("{:.1} us (minimum {:.1})", self.median(), self.minimum())
+        let (median, minimum) = (self.median(), self.minimum());
+        if median < 1.0 {
+            format!("{:.0} ns (minimum {:.0})", median * 1e3, minimum * 1e3)
+        } else {
+            format!("{median:.1} us (minimum {minimum:.1})")
+        }
     }
 
     /// Median and quartiles of peer / ours, repetition by repetition: `3.5 (3.4..3.6)`.
@@ -41,7 +51,7 @@ fn quantile(numbers: &[f64], at: f64) -> f64 {
     sorted.get(index as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// A thing to time: name and one call.
+/// Name, and one call.
 pub(super) type Contender<'a> = (&'static str, Box<dyn FnMut() + 'a>);
 
 /// Times all contenders in turns: `repetitions` rounds of `calls` calls each.
