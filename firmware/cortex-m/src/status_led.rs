@@ -1,4 +1,4 @@
-//! The status LED: one blink pattern for each thing that an operator beside the aircraft must be able to tell apart.
+//! The status LED: one blink pattern for each state that an operator beside the aircraft must distinguish.
 
 use embedded_hal::digital::{OutputPin, PinState};
 use gleaner_pilot::State;

@@ -13,9 +13,9 @@ use heapless::Vec;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// The engine; `None` when the model is damaged.
-struct Engine(Option<NativePolicy<'static>>);
+struct BoardEngine(Option<NativePolicy<'static>>);
 
-impl Policy for Engine {
+impl Policy for BoardEngine {
     type Error = ();
 
     fn infer(&mut self, tokens: &Tokens) -> Result<Inference, ()> {
@@ -24,7 +24,7 @@ impl Policy for Engine {
 }
 
 static WORKSPACE: ConstStaticCell<Workspace> = ConstStaticCell::new(Workspace::new());
-static ONBOARD: StaticCell<Onboard<Timed<Engine>>> = StaticCell::new();
+static ONBOARD: StaticCell<Onboard<Timed<BoardEngine>>> = StaticCell::new();
 
 /// Boots the pilot and runs it forever.
 pub fn fly<B: Board>(parts: Parts<B>) -> ! {
@@ -47,7 +47,7 @@ pub fn fly<B: Board>(parts: Parts<B>) -> ! {
 
 /// The main loop. Not inlined, so that its stack frame is not added to those of the boot.
 #[inline(never)]
-fn run<B: Board>(onboard: &mut Onboard<Timed<Engine>>, mut services: Services<B>) -> ! {
+fn run<B: Board>(onboard: &mut Onboard<Timed<BoardEngine>>, mut services: Services<B>) -> ! {
     let mut runtime = Runtime::new(onboard, serial::link(), serial::radio());
     B::start_watchdog();
     loop {
@@ -81,14 +81,14 @@ impl fmt::Display for BootFault {
 /// Builds the pilot and loads mission and model. The pilot is built in its final place, and each step has a stack
 /// frame that ends before the next one starts: the stack is smaller than a pilot.
 #[inline(never)]
-fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<Engine>>, Vec<BootFault, 2>) {
+fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<BoardEngine>>, Vec<BootFault, 2>) {
     let mut faults = Vec::new();
     let (Some(workspace), Some(place)) = (WORKSPACE.try_take(), ONBOARD.try_uninit()) else {
         fault::end(Cause::Panic { line: line!() })
     };
     let policy = engine(workspace).map_err(|fault| faults.push(fault)).ok();
     let tested = if policy.is_some() { Ok(()) } else { Err(SelfTestError::NoGolden) };
-    let onboard = ground(place, parameters.clone(), Engine(policy));
+    let onboard = ground(place, parameters.clone(), BoardEngine(policy));
     if let Err(fault) = load(onboard, tested) {
         let _ = faults.push(fault);
     }
@@ -107,17 +107,20 @@ fn engine(workspace: &'static mut Workspace) -> Result<NativePolicy<'static>, Bo
 /// Builds a pilot without mission in `place`.
 #[inline(never)]
 fn ground(
-    place: &'static mut MaybeUninit<Onboard<Timed<Engine>>>,
+    place: &'static mut MaybeUninit<Onboard<Timed<BoardEngine>>>,
     parameters: Parameters,
-    engine: Engine,
-) -> &'static mut Onboard<Timed<Engine>> {
+    engine: BoardEngine,
+) -> &'static mut Onboard<Timed<BoardEngine>> {
     let Ok(ids) = Settings::default().checked() else { fault::end(Cause::Panic { line: line!() }) };
     place.write(Onboard::grounded(parameters, ids, Timed::new(engine, now)))
 }
 
 /// Loads the mission from flash. A pilot without mission communicates but does not engage.
 #[inline(never)]
-fn load(onboard: &mut Onboard<Timed<Engine>>, tested: Result<(), SelfTestError>) -> Result<(), BootFault> {
+fn load(
+    onboard: &mut Onboard<Timed<BoardEngine>>,
+    tested: Result<(), SelfTestError>,
+) -> Result<(), BootFault> {
     let mission = mission_image::decode(images::mission()).map_err(BootFault::Mission)?;
     onboard.load(&mission, tested).map_err(|_| BootFault::Impossible)
 }

@@ -1,21 +1,19 @@
 //! The three serial lines: pins, baud rates, interrupts.
 
 use cortex_m::peripheral::NVIC;
-use gleaner_cortex_m::bare::stm32::Gpio;
+use gleaner_cortex_m::bare::stm32::{Gpio, give_line_pins};
 use gleaner_cortex_m::bare::{LINK, LINK_BAUD, LOG, LOG_BAUD, RADIO, RADIO_BAUD};
 use gleaner_cortex_m::{LineFault, Uart};
 use stm32f4::stm32f405::{GPIOA, GPIOB, GPIOC, Interrupt, Peripherals, UART4, USART2, USART3, interrupt};
-
-/// Alternate function of USART2 and USART3.
-const AF_USART_1_TO_3: u32 = 7;
-/// Alternate function of UART4.
-const AF_UART4: u32 = 8;
 
 /// Gives the pins to the UARTs and starts them.
 pub fn start(chip: &Peripherals, apb1_hz: u32) {
     chip.RCC.ahb1enr().modify(|_, w| w.gpioaen().set_bit().gpioben().set_bit().gpiocen().set_bit());
     chip.RCC.apb1enr().modify(|_, w| w.usart2en().set_bit().usart3en().set_bit().uart4en().set_bit());
-    give_pins();
+    // SAFETY: ports whose clocks are enabled; nothing else uses these pins.
+    give_line_pins(unsafe {
+        [Gpio::new(GPIOA::ptr().cast()), Gpio::new(GPIOB::ptr().cast()), Gpio::new(GPIOC::ptr().cast())]
+    });
 
     chip.USART2.brr().write(|w| unsafe { w.bits(divider(apb1_hz, LINK_BAUD)) });
     chip.USART2.cr1().write(|w| w.ue().set_bit().te().set_bit().re().set_bit().rxneie().set_bit());
@@ -26,25 +24,6 @@ pub fn start(chip: &Peripherals, apb1_hz: u32) {
     for interrupt in [Interrupt::USART2, Interrupt::USART3, Interrupt::UART4] {
         // SAFETY: the handlers below are ready, and no critical section relies on these interrupts being masked.
         unsafe { NVIC::unmask(interrupt) };
-    }
-}
-
-/// Gives the pins to the UARTs. Inputs are pulled up, so that an open line is idle.
-fn give_pins() {
-    // SAFETY: ports whose clocks are enabled; nothing else uses these pins.
-    let [a, b, c] = unsafe {
-        [Gpio::new(GPIOA::ptr().cast()), Gpio::new(GPIOB::ptr().cast()), Gpio::new(GPIOC::ptr().cast())]
-    };
-    a.pull_up(3);
-    b.pull_up(11);
-    for (port, pin, function) in [
-        (a, 2, AF_USART_1_TO_3),
-        (a, 3, AF_USART_1_TO_3),
-        (b, 10, AF_USART_1_TO_3),
-        (b, 11, AF_USART_1_TO_3),
-        (c, 10, AF_UART4),
-    ] {
-        port.alternate(pin, function);
     }
 }
 
