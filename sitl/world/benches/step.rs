@@ -1,4 +1,4 @@
-//! What one slot, one reset and one city cost.
+//! Time of one slot, one reset and one city.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use gleaner_units::Action;

@@ -25,22 +25,22 @@ pub enum Fading {
     Rayleigh,
 }
 
-/// The constants of the channel. [`Channel::default`] has the values of the paper where it prints them; noise and
-/// slot capacity, which it leaves open, are those that reproduce its printed figures.
+/// The constants of the channel. [`Channel::default`] has the paper's values. The paper gives neither noise nor slot
+/// capacity; the defaults reproduce its printed results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Channel {
     /// With line of sight: 2.5, -30 dB, 2 dB^2.
     pub line_of_sight: PathLoss,
     /// Without: 3.04, -35 dB, 5 dB^2.
     pub obstructed: PathLoss,
-    /// P: 36 dBm.
+    /// P, transmit power: 36 dBm.
     pub transmit: Dbm,
-    /// sigma^2: -60 dBm. The published code of the channel's lineage (Chen et al., model-aided federated
-    /// reinforcement learning for UAV data harvesting) has the same.
+    /// sigma^2, noise level: -60 dBm, as in the published code of an earlier form of this channel (Chen et al., model-aided
+    /// federated reinforcement learning for UAV data harvesting).
     pub noise: Dbm,
-    /// Sigma: below 5 dB no data flows.
+    /// Sigma, threshold: below 5 dB there is no transmission.
     pub threshold: Db,
-    /// kappa: data units that a slot carries for each bit per second per hertz, bandwidth times slot length: 100.
+    /// kappa, bandwidth times slot length: 100 data units per slot for 1 bit/s/Hz.
     pub slot_units: f32,
     /// None by default.
     pub fading: Fading,
@@ -69,8 +69,8 @@ impl Channel {
 
     /// SNR of a link without shadowing and fading. `distance` is the length of the straight line in space.
     ///
-    /// The paper prints the gain as `beta - alpha log10(d)`. Path loss in decibels needs `10 alpha`; without the
-    /// 10 every link of the city would sit near 50 dB.
+    /// The paper prints the gain as `beta - alpha log10(d)`. Path loss in decibels needs `10 alpha`; without the 10, every
+    /// link of the city would have about 50 dB.
     #[must_use]
     pub fn mean_snr(&self, line_of_sight: bool, distance: Metres) -> Db {
         let loss = self.path_loss(line_of_sight);
@@ -78,7 +78,7 @@ impl Channel {
         self.transmit + gain - self.noise
     }
 
-    /// Data units that one slot carries at this SNR (paper, eq. 6); nothing below the threshold.
+    /// Data units of one slot at this SNR (paper, eq. 6); 0 below the threshold.
     #[must_use]
     pub fn data_per_slot(&self, snr: Db) -> f32 {
         if snr >= self.threshold {
@@ -88,8 +88,7 @@ impl Channel {
         }
     }
 
-    /// The mean of [`Channel::data_per_slot`] over the shadowing, for planners that know the mean SNR. Fading is
-    /// left out.
+    /// The mean of [`Channel::data_per_slot`] over the shadowing, for planners that know the mean SNR. Without fading.
     ///
     /// # Cost
     /// A sum over 121 points: tabulate it.
@@ -106,7 +105,7 @@ impl Channel {
         sum / weights
     }
 
-    /// The SNR in one slot of a pair of links, each given by its condition and its mean.
+    /// The SNR in one slot of two links, each given by its condition and its mean.
     pub(crate) fn draw_pair(&self, links: [(bool, Db); 2], rng: &mut impl Rng) -> [Db; 2] {
         let (first, second) = normal_pair(rng);
         [(links[0], first), (links[1], second)].map(|((line_of_sight, mean), normal)| {

@@ -15,7 +15,7 @@ pub struct City {
     sight: SightTable,
 }
 
-/// Why a map is no city.
+/// Why a map cannot be a city.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum CityError {
     /// The text is not a height map.
@@ -31,7 +31,7 @@ pub enum CityError {
         /// Flight altitude.
         altitude_m: u16,
     },
-    /// Every cell is built: there is no place for a device.
+    /// All cells are built, so no device has a place.
     #[error("every cell carries a building: leave open ground for the devices")]
     NoOpenCell,
 }
@@ -42,7 +42,7 @@ impl City {
     /// The side of a cell in the cities made here (paper, same table).
     pub const CELL: Metres = Metres(20.0);
 
-    /// Makes a city of a height map.
+    /// A city with these heights.
     ///
     /// # Errors
     /// See [`CityError`].
@@ -108,14 +108,14 @@ impl City {
         &self.open_cells
     }
 
-    /// Whether the cell lies in the city and carries no building.
+    /// Whether the cell is in the city and has no building.
     #[must_use]
     pub fn is_open(&self, cell: Cell) -> bool {
         self.heights.height_m(cell) == Some(0)
     }
 
-    /// Whether a device on the ground of the open cell `device` sees the aircraft at flight altitude over `uav`,
-    /// both at the centres of their cells. Never for a device on a building or a cell outside the city.
+    /// Whether there is line of sight between a device on the open cell `device` and an aircraft at flight altitude over
+    /// `uav`, both at the centres of their cells. `false` for a device on a building or a cell outside the city.
     #[must_use]
     pub fn line_of_sight(&self, device: Cell, uav: Cell) -> bool {
         match (self.sight.row(device), self.grid().index(uav)) {
@@ -128,8 +128,7 @@ impl City {
         &self.sight
     }
 
-    /// A fingerprint of grid, altitude and heights (64-bit FNV-1a), for the metadata of models: equal
-    /// cities have equal ones. Printed as 16 hexadecimal digits.
+    /// A hash of grid, altitude and heights (64-bit FNV-1a) for the metadata of models. Printed as 16 hexadecimal digits.
     #[must_use]
     pub fn fingerprint(&self) -> u64 {
         let grid = self.grid();

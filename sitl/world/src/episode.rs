@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// A mission being flown on the grid.
+/// A mission in progress.
 #[derive(Clone, Debug)]
 pub struct Episode {
     world: Arc<World>,
@@ -20,20 +20,20 @@ pub struct Episode {
     done: bool,
 }
 
-/// What one slot brought and cost.
+/// The outcome of one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Index of the device that was served, if one was.
+    /// Index of the served device, if any.
     pub served: Option<usize>,
-    /// What it sent, data units.
+    /// Data sent, data units.
     pub collected_units: f32,
-    /// What the action took from the battery.
+    /// Energy of the action.
     pub energy: BatteryUnits,
     /// Whether the mission is over.
     pub done: bool,
 }
 
-/// Why an action could not be flown. The episode is as it was before.
+/// Why an action is impossible. The episode is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum StepError {
     /// The mission is over.
@@ -44,10 +44,10 @@ pub enum StepError {
     OffGrid {
         /// Where the aircraft is.
         from: Cell,
-        /// What it was told.
+        /// The action.
         action: Action,
     },
-    /// The battery holds less than the action takes.
+    /// The battery holds less than the action needs.
     #[error("the battery is empty at {at}, away from the terminal")]
     BatteryEmpty {
         /// Where the aircraft is.
@@ -56,7 +56,7 @@ pub enum StepError {
 }
 
 impl Episode {
-    /// Puts the aircraft at the start and hears every device for the first time. `seed` names the shadowing.
+    /// Starts a mission and draws the SNR of its first slot. `seed` determines the shadowing.
     ///
     /// # Errors
     /// [`ScenarioError::DeviceNotOpen`] if the realization was drawn for another city.
@@ -76,7 +76,7 @@ impl Episode {
         Ok(episode)
     }
 
-    /// Like [`Episode::new`] in the same world, in the memory of this one.
+    /// As [`Episode::new`] in the same world, reusing the memory of this episode.
     ///
     /// # Errors
     /// Those of [`Episode::new`]; the episode is then over.
@@ -93,12 +93,15 @@ impl Episode {
         Ok(())
     }
 
-    /// Flies one slot. In this order: the device that is heard best at the *present* cell is served, with the SNR that
-    /// the observation shows; the aircraft hovers or moves; the battery pays; every device is heard anew at the
-    /// new cell. A *move* into the terminal ends the mission; hovering there, as RB may at its start, does not.
+    /// Flies one slot, in this order:
+    /// 1. The reachable device with the highest SNR at the *present* cell sends, at the SNR of the present observation.
+    /// 2. The aircraft hovers or moves, and the battery loses the energy of the action.
+    /// 3. The SNR of every device is drawn for the new cell.
+    ///
+    /// A *move* into the terminal ends the mission. Hovering there, as is possible at the start of RB, does not.
     ///
     /// # Errors
-    /// See [`StepError`]. Whether an action is wise is not checked.
+    /// See [`StepError`]. Safety is not checked.
     ///
     /// # Cost
     /// No allocation; well under a microsecond with 6 devices.
@@ -127,8 +130,8 @@ impl Episode {
         })
     }
 
-    /// The vector reward of a step of this episode (paper, eq. 12): data in percent of what all devices held at the
-    /// start, and minus the energy in battery units.
+    /// The vector reward of a step of this episode (paper, eq. 12): data in percent of the initial data of all devices, and
+    /// minus the energy in battery units.
     #[must_use]
     pub fn reward(&self, step: &Step) -> [f32; 2] {
         let initial_units = self.field.initial_units();
@@ -136,13 +139,13 @@ impl Episode {
         [percent, -step.energy.0]
     }
 
-    /// The world that it is flown in.
+    /// The world.
     #[must_use]
     pub const fn world(&self) -> &Arc<World> {
         &self.world
     }
 
-    /// The devices, in the realization's order, as heard at [`Episode::uav`] in the present slot.
+    /// The devices, in the realization's order, with their SNR at [`Episode::uav`] in the present slot.
     #[must_use]
     pub fn devices(&self) -> &[Device] {
         self.field.devices()
@@ -166,7 +169,7 @@ impl Episode {
         self.terminal
     }
 
-    /// What the battery holds.
+    /// Energy in the battery.
     #[must_use]
     pub const fn battery(&self) -> BatteryUnits {
         self.battery

@@ -7,7 +7,7 @@ use rand::Rng;
 /// A device during a mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Device {
-    /// Where it stands.
+    /// Its cell.
     pub cell: Cell,
     /// D_0: its data at the start, data units.
     pub initial_units: f32,
@@ -29,8 +29,8 @@ pub struct Serving {
     pub collected_units: f32,
 }
 
-/// The devices of one mission: remaining data and links. It does not know how the aircraft moves, so an episode on
-/// the grid and a simulated aircraft use the same field.
+/// The devices of one mission: remaining data and links. It is independent of the aircraft's motion, so an episode on the
+/// grid and a simulated aircraft use the same field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Field {
     devices: Vec<Device>,
@@ -39,7 +39,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// The devices of `realization`, unheard: call [`Field::listen`] before the first slot.
+    /// The devices of `realization`, without SNR: call [`Field::listen`] before the first slot.
     ///
     /// # Errors
     /// [`ScenarioError::DeviceNotOpen`] if the realization was drawn for another city.
@@ -49,7 +49,7 @@ impl Field {
         Ok(field)
     }
 
-    /// Like [`Field::new`], in the memory of this one. After an error the field is empty.
+    /// As [`Field::new`], reusing the memory of this field. After an error the field is empty.
     ///
     /// # Errors
     /// Those of [`Field::new`].
@@ -75,7 +75,7 @@ impl Field {
         Ok(())
     }
 
-    /// Draws every device's SNR for a slot with the aircraft over `uav`. Outside the city nothing is heard.
+    /// Draws every device's SNR for a slot with the aircraft over `uav`. Outside the city there is no reception.
     pub fn listen(&mut self, world: &World, uav: Cell, rng: &mut impl Rng) {
         let channel = world.channel();
         let Some(index) = world.city().grid().index(uav) else {
@@ -97,8 +97,8 @@ impl Field {
         }
     }
 
-    /// Serves one slot at the SNR heard last: of the reachable devices with data left the one with the highest SNR (the
-    /// first of equals) sends what the slot carries, at most what it has (paper, eq. 6 to 8).
+    /// Serves one slot with the SNR drawn last. Of the reachable devices with data left, the one with the highest SNR (the
+    /// first of equal ones) sends as much as the slot carries and at most its remaining data (paper, eq. 6 to 8).
     pub fn serve(&mut self, world: &World) -> Option<Serving> {
         let mut best: Option<(usize, Db)> = None;
         for (index, device) in self.devices.iter().enumerate() {
@@ -121,19 +121,19 @@ impl Field {
         &self.devices
     }
 
-    /// What all devices held at the start, data units.
+    /// Initial data of all devices, data units.
     #[must_use]
     pub const fn initial_units(&self) -> f32 {
         self.initial_units
     }
 
-    /// What has been collected so far, data units.
+    /// Data collected so far, data units.
     #[must_use]
     pub const fn collected_units(&self) -> f32 {
         self.collected_units
     }
 
-    /// What has been collected so far, as a fraction of what there was; 1 when there was nothing.
+    /// Data collected so far, as a fraction of the initial data; 1 if there was none.
     #[must_use]
     pub fn collected_fraction(&self) -> f32 {
         if self.initial_units > 0.0 { self.collected_units / self.initial_units } else { 1.0 }

@@ -7,7 +7,7 @@ use rand::Rng;
 
 const WIDTH: u16 = 40;
 const HEIGHT: u16 = 30;
-/// Widths of the streets, in turn.
+/// Widths of the streets, in this order and again.
 const STREETS: [i16; 4] = [1, 2, 1, 3];
 /// A block is 3 to 6 cells wide.
 const BLOCK_MIN: i16 = 3;
@@ -33,8 +33,8 @@ pub(crate) fn heights(seed: u64, cell: Metres) -> HeightMap {
     map
 }
 
-/// Where the blocks lie along one side: a street, a block, the next street, and so on. Which street comes first
-/// is drawn; a block that would reach over the edge is cut.
+/// The blocks along one side: streets and blocks in turn. The first street is drawn at random, and a block that crosses the
+/// edge is cut.
 fn blocks(rng: &mut impl Rng, side: i16) -> Vec<Range<i16>> {
     let mut blocks = Vec::new();
     let mut turn = below(rng, STREETS.len() as u32) as usize;

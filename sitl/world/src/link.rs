@@ -3,7 +3,7 @@
 use crate::{Channel, City};
 use gleaner_units::{Cell, Db, Metres};
 
-/// A city with a channel, and the mean SNR by distance and link condition. Share it (`Arc`): it never changes.
+/// A city with a channel, and the mean SNR by distance and link condition. It is immutable; share it with `Arc`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct World {
     city: City,
@@ -13,7 +13,7 @@ pub struct World {
 }
 
 impl World {
-    /// Puts a channel over a city.
+    /// A city with a channel.
     #[must_use]
     pub fn new(city: City, channel: Channel) -> World {
         let grid = city.grid();
@@ -30,7 +30,7 @@ impl World {
         World { city, channel, mean_snr }
     }
 
-    /// The default city under the default channel.
+    /// The default city with the default channel.
     #[must_use]
     pub fn default_world() -> World {
         World::new(City::default_city(), Channel::default())

@@ -1,4 +1,4 @@
-//! Mirror images of the grid: a policy that learned one city has seen four.
+//! Reflections of the grid: training in one city and its reflections is training in four cities.
 
 use gleaner_units::{Action, Cell, Grid, HeightMap};
 
@@ -20,7 +20,7 @@ impl Mirror {
         Mirror { east_west: true, north_south: true },
     ];
 
-    /// Where a cell of `grid` goes.
+    /// The image of a cell of `grid`.
     #[must_use]
     pub const fn cell(self, grid: Grid, cell: Cell) -> Cell {
         Cell {
@@ -29,7 +29,7 @@ impl Mirror {
         }
     }
 
-    /// What an action becomes.
+    /// The image of an action.
     #[must_use]
     pub const fn action(self, action: Action) -> Action {
         match action {
@@ -41,7 +41,7 @@ impl Mirror {
         }
     }
 
-    /// The city as the mirror shows it.
+    /// The image of a city.
     #[must_use]
     pub fn heights(self, heights: &HeightMap) -> HeightMap {
         let grid = heights.grid();

@@ -8,7 +8,7 @@ use rand::Rng;
 /// A device and its data at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Where it stands: an open cell.
+    /// Its cell, which is open.
     pub cell: Cell,
     /// D_0: its data at the start, data units.
     pub data_units: f32,
@@ -23,7 +23,7 @@ pub struct Realization {
     devices: Vec<Placement>,
 }
 
-/// Devices are at least this far apart.
+/// Least distance between two devices.
 const SPACING_M: f32 = 100.0;
 /// D_0 is uniform in this range.
 const DATA_MIN_UNITS: f32 = 5000.0;
@@ -57,8 +57,8 @@ impl Realization {
 
     /// Draws the devices: open cells at least 100 m apart, data uniform in 5000 to 8000 units.
     ///
-    /// The devices are drawn one after the other, so a seed with K devices begins with its first K - 1 (unless the
-    /// city is so full that the layout had to be begun anew).
+    /// The devices are drawn one after the other, so the layout with K devices contains the layout of the same seed with
+    /// K - 1, unless the city is so full that the draw had to start again.
     ///
     /// # Errors
     /// See [`ScenarioError`].
@@ -72,7 +72,7 @@ impl Realization {
         Err(ScenarioError::TooManyDevices(scenario.device_count))
     }
 
-    /// Where the mission begins.
+    /// Start cell.
     #[must_use]
     pub const fn start(&self) -> Cell {
         self.start

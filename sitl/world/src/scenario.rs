@@ -55,13 +55,13 @@ impl FromStr for ScenarioKind {
 /// A mission before the devices are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scenario {
-    /// Where the mission begins.
+    /// Start cell.
     pub start: Cell,
     /// A move into this cell ends it.
     pub terminal: Cell,
-    /// B: what the battery holds at the start.
+    /// B: energy at the start.
     pub battery: BatteryUnits,
-    /// K: how many devices.
+    /// K: number of devices.
     pub device_count: usize,
 }
 
@@ -86,7 +86,7 @@ pub enum ScenarioError {
         /// Moves of the shortest mission.
         moves: u32,
     },
-    /// The city has no room for so many devices at their distance from each other.
+    /// The city has no room for this number of devices at their least distance.
     #[error("the city has no room for {0} devices 100 m apart: ask for fewer")]
     TooManyDevices(usize),
 }
@@ -122,7 +122,7 @@ impl Scenario {
         Scenario { battery, ..self }
     }
 
-    /// The same in another city: start and terminal on the open cells nearest to these, of equals the first.
+    /// The same in another city, with start and terminal on the nearest open cells, the first of equal ones.
     #[must_use]
     pub fn in_city(self, city: &City) -> Scenario {
         let open_near = |zone: Cell| {

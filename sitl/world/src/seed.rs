@@ -5,9 +5,9 @@ use rand_chacha::ChaCha8Rng;
 
 /// Seed of one realization or one episode.
 ///
-/// The number and the repeat are the key of a ChaCha generator with 8 rounds; what the draws are for is its
-/// stream number: training layout 0, slots 1, choices 2; evaluation layout 3, slots 4, choices 5; cities 6.
-/// So no training draw ever equals an evaluation draw, whatever the numbers.
+/// The number and the repeat are the key of a ChaCha generator with 8 rounds. The purpose of a draw is the generator's
+/// stream number: training layout 0, slots 1, choices 2; evaluation layout 3, slots 4, choices 5; cities 6. Training and
+/// evaluation therefore never share a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Seed {
     evaluation: bool,
@@ -15,10 +15,10 @@ pub struct Seed {
     repeat: u32,
 }
 
-/// What random draws are for. Each has its own stream, so that drawing more of one never shifts another.
+/// Purpose of random draws. Each has its own stream, so that more draws for one do not shift those for another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
-    /// Where the devices are and how much they hold.
+    /// Cells and data of the devices.
     Layout,
     /// Shadowing and fading during the flight.
     Slots,
@@ -39,19 +39,19 @@ impl Seed {
         Seed { evaluation: true, number, repeat: 0 }
     }
 
-    /// The same seed, flown once more: other shadowing, same number. The plain seed is repeat 0.
+    /// The same seed for another flight of its realization: other shadowing. The plain seed is repeat 0.
     #[must_use]
     pub const fn repeat(self, repeat: u32) -> Seed {
         Seed { repeat, ..self }
     }
 
-    /// The number it was made from.
+    /// Its number.
     #[must_use]
     pub const fn number(self) -> u64 {
         self.number
     }
 
-    /// The generator for one kind of draw.
+    /// The generator for one purpose.
     #[must_use]
     pub fn rng(self, stream: Stream) -> ChaCha8Rng {
         let base = if self.evaluation { 3 } else { 0 };

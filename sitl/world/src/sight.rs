@@ -2,7 +2,7 @@
 
 use gleaner_units::{Cell, Grid, HeightMap, Rays, Sight};
 
-/// Which open cell sees which cell at flight altitude: one bit for each pair.
+/// Line of sight between open cells and cells at flight altitude: one bit for each pair.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SightTable {
     grid: Grid,
@@ -42,7 +42,7 @@ impl SightTable {
         self.grid.index(device).map(|index| self.rows[index]).filter(|&row| row != NO_ROW)
     }
 
-    /// Whether the open cell with this row sees the cell with index `uav`.
+    /// Whether there is line of sight between the open cell with this row and the cell with index `uav`.
     pub(crate) fn sees(&self, row: u32, uav: usize) -> bool {
         self.bits[row as usize * self.words_per_row + uav / 64] & (1 << (uav % 64)) != 0
     }

@@ -1,4 +1,4 @@
-//! What a slot does, in which order, and that a seed means one flight.
+//! The order inside a slot, and the determinism of a seed.
 
 use gleaner_units::{Action, BatteryUnits, Cell};
 use gleaner_world::{
@@ -31,7 +31,7 @@ fn single(world: &Arc<World>, data_units: f32) -> Episode {
 
 #[test]
 fn a_seed_is_one_flight_on_every_platform() {
-    // Frozen on the first run. If they move, published figures and golden flights move with them.
+    // Recorded values. If they change, published figures and golden flights change too.
     let world = world();
     assert_eq!(format!("{:016x}", world.city().fingerprint()), FINGERPRINT);
     assert_eq!(format!("{:016x}", City::generate(1).fingerprint()), FINGERPRINT_1);
@@ -195,7 +195,7 @@ proptest! {
         ..ProptestConfig::default()
     })]
 
-    /// Whatever is flown: battery, data and scheduling add up, and a reset repeats the flight.
+    /// For random actions: battery, data and scheduling are consistent, and a reset repeats the flight.
     #[test]
     fn the_books_balance(number in 0_u64..1000, devices in 1_usize..=12, actions in prop::collection::vec(0_usize..5, 1..120)) {
         let world = world();

@@ -1,4 +1,4 @@
-//! The figures that the settled numbers of the world promise, measured; and line of sight judged by another method.
+//! Documented statistics of the world, measured; and line of sight against another method.
 
 use gleaner_units::{Cell, HeightMap, Metres};
 use gleaner_world::{City, Mirror, Scenario, Seed, Stream, World};
@@ -52,7 +52,7 @@ fn the_links_of_the_default_city_are_the_documented_ones() {
     }
 }
 
-/// What brute force says of one line: `None` within `margin_m` of a building's edge or top, where sampling cannot tell.
+/// Line of sight by sampling; `None` within `margin_m` of a building's edge or top, where sampling is not conclusive.
 fn sampled_sight(heights: &HeightMap, device: Cell, uav: Cell, margin_m: f64) -> Option<bool> {
     const SAMPLES: u32 = 10_000;
     let at = |from: i16, to: i16, t: f64| (f64::from(from) + 0.5 + t * f64::from(to - from)) * 20.0;
@@ -146,7 +146,7 @@ fn generated_cities_are_like_the_default_one() {
     );
     assert!((0.36..0.50).contains(&mean(&built)), "{}", mean(&built));
     assert!((0.17..0.32).contains(&mean(&clear)), "{}", mean(&clear));
-    // Every one has room for a mission with the most devices that a policy takes.
+    // Each has room for a mission with the largest number of devices.
     for number in 0..20 {
         let city = City::generate(number);
         let zone = city.open_cells()[0];
