@@ -12,15 +12,15 @@ const ROUNDS: usize = 6;
 const UPDATES_A_ROUND: usize = 20;
 
 fn main() {
-    let mut learner = twin::Learner::new();
+    let mut twin = twin::Twin::new();
     for _ in 0..WARM_UP {
-        learner.update();
+        twin.update();
     }
     let (mut least_cpu, mut least_wall) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..ROUNDS {
         let (cpu, wall) = (cpu_ms(), Instant::now());
         for _ in 0..UPDATES_A_ROUND {
-            learner.update();
+            twin.update();
         }
         let each = 1.0 / UPDATES_A_ROUND as f64;
         least_wall = least_wall.min(wall.elapsed().as_secs_f64() * 1e3 * each);
@@ -29,6 +29,6 @@ fn main() {
         }
     }
     // Printed so that the compiler cannot remove the computation.
-    let sum: f32 = learner.actor.parameters.iter().sum();
+    let sum: f32 = twin.actor.parameters.iter().sum();
     println!("gleaner cpu_ms {least_cpu:.2} wall_ms {least_wall:.2} (sum of parameters {sum:.4})");
 }

@@ -26,7 +26,7 @@ def build():
         message = json.loads(line)
         if message.get("executable") and message["target"]["name"] == "update_ms":
             return message["executable"]
-    sys.exit("gleaner: no program built: run the cargo command by hand: " + " ".join(BUILD))
+    sys.exit("gleaner: no program built: type: " + " ".join(BUILD))
 
 
 def cpu_ms(command):

@@ -8,7 +8,7 @@ use tempfile::TempDir;
 /// time, as always.
 const SPEED: &str = "5";
 
-/// What the autopilot's line is made of.
+/// Kind of the autopilot's line.
 #[derive(Clone, Copy, Debug)]
 pub enum Link {
     /// A byte stream.

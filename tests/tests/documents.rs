@@ -1,5 +1,5 @@
-//! The documents are true as far as a program can judge: paths and links exist, commands name real programs, commands
-//! and flags, tables are complete, the README is short, and CI runs the command that it names.
+//! Checks of the documents: paths and links exist, commands name existing programs, commands and flags, tables are
+//! complete, the README is short, and CI runs the command that it names.
 
 use gleaner_tests::programs::{self, repository};
 use std::collections::BTreeMap;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const TEST_COMMAND: &str = "cargo test --release --workspace";
-/// The README is a door: the rest is in `docs`.
+/// Most lines of the README: the rest is in `docs`.
 const README_LINES: usize = 170;
 
 /// Every Markdown document, as a path from the repository's root, with its text.

@@ -1,5 +1,4 @@
-//! The examples of the library crates run and print what their heads promise. `cargo test --release --workspace` builds
-//! them.
+//! The examples of the library crates run and print the documented output. `cargo test --release --workspace` builds them.
 
 use gleaner_tests::programs::{self, repository};
 use std::process::Command;
@@ -15,7 +14,7 @@ fn run(example: &str, arguments: &[&str]) -> String {
 fn one_observation_prints_five_logits_and_a_decision() {
     let printed = run("one_observation", &[]);
     assert_eq!(printed.lines().count(), 6, "{printed}");
-    // For data alone, towards a device that is heard well, or staying in its range.
+    // For data alone: a move towards a device with high SNR, or hovering in its range.
     let decision = printed.lines().last().unwrap().strip_prefix("decision: ").unwrap();
     assert!(["east", "hover"].contains(&decision), "{printed}");
 }

@@ -1,4 +1,4 @@
-//! What the shipped policy must achieve in the simulated city, through the installed program.
+//! Requirements on the shipped policy in the simulated city, through the program.
 
 use gleaner_tests::programs;
 use serde_json::Value;

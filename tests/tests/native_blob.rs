@@ -1,4 +1,4 @@
-//! The native engine's file: anything else is refused with the reason.
+//! The native engine's file: damaged and foreign files are refused with the reason.
 
 use gleaner_policy::native::{AlignedBytes, BlobError, Model, NativePolicy, WeightFormat, Workspace};
 use gleaner_policy::onnx::convert;

@@ -11,14 +11,14 @@ use std::process::Command;
 /// An RB mission at w = 0 has two decisions; at ten times real time it takes 15 s.
 const QUICK: [&str; 8] = ["--scenario", "rb", "--seed", "5", "--preference", "0", "--speedup", "8"];
 
-struct Flight {
+struct FlownMission {
     report: Value,
     /// Decision records of the simulator and of the pilot.
     decisions: [Vec<Value>; 2],
 }
 
 /// Flies with `gleaner` on a line for the autopilot and, if it has one, on a line for the radio.
-fn fly(arguments: &[&str], has_radio: bool) -> Flight {
+fn fly(arguments: &[&str], has_radio: bool) -> FlownMission {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (mission, out, log) = (at("mission.toml"), at("out"), at("log"));
@@ -44,7 +44,7 @@ fn fly(arguments: &[&str], has_radio: bool) -> Flight {
     let simulators: f32 = replayed(&out, "tract").parse().unwrap();
     assert!(simulators <= gleaner_policy::GOLDEN_TOLERANCE, "the simulator's log: {simulators}");
     let decisions = [&out, &log].map(|folder| lines(&Path::new(folder).join("decisions.jsonl")));
-    Flight { report: serde_json::from_str(&format!("{{{report}")).unwrap(), decisions }
+    FlownMission { report: serde_json::from_str(&format!("{{{report}")).unwrap(), decisions }
 }
 
 /// Replays a log, in which no decision may change; returns the largest difference of a logit.
@@ -64,8 +64,8 @@ fn lines(path: &Path) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
-fn check(flight: &Flight, decisions: usize, devices: usize) {
-    let Flight { report, decisions: [harness, pilot] } = flight;
+fn check(flight: &FlownMission, decisions: usize, devices: usize) {
+    let FlownMission { report, decisions: [harness, pilot] } = flight;
     let verdict = (&report["landed"], &report["violations"], &report["engine"]);
     assert_eq!(verdict, (&true.into(), &0.into(), &"board".into()), "{report}");
     assert_eq!((harness.len(), report["decisions"].as_u64().unwrap() as usize), (decisions, decisions));
@@ -93,7 +93,8 @@ fn a_rotated_grid_flies_the_same_mission_over_the_wire() {
     let straight = fly(&QUICK, true);
     let rotated = fly(&[&QUICK[..], &["--grid-rotation", "-37.5"]].concat(), true);
     check(&rotated, 2, 6);
-    let [(_, straight), (_, rotated)] = [straight, rotated].map(|Flight { decisions: [a, b], .. }| (a, b));
+    let [(_, straight), (_, rotated)] =
+        [straight, rotated].map(|FlownMission { decisions: [a, b], .. }| (a, b));
     for (straight, rotated) in straight.iter().zip(&rotated) {
         for key in ["cell", "action", "mask", "battery"] {
             assert_eq!(straight[key], rotated[key], "{key}");

@@ -13,16 +13,16 @@ const VALUES: usize = ACTIONS * OBJECTIVES;
 const NU: f32 = 0.1;
 
 /// One network, its gradients and its optimiser.
-pub struct Trained {
+pub struct TwinNetwork {
     pub parameters: Vec<f32>,
     pub gradients: Vec<f32>,
     adam: Adam,
 }
 
 /// All networks and buffers of an update.
-pub struct Learner {
-    pub actor: Trained,
-    pub critics: [Trained; 2],
+pub struct Twin {
+    pub actor: TwinNetwork,
+    pub critics: [TwinNetwork; 2],
     targets: [Vec<f32>; 2],
     pub before: Batch,
     after: Batch,
@@ -32,7 +32,7 @@ pub struct Learner {
     pub workspace: Workspace,
 }
 
-impl Trained {
+impl TwinNetwork {
     fn new(shape: Shape, rng: &mut ChaCha8Rng) -> Self {
         let parameters = shape.initialise(rng);
         let count = parameters.len();
@@ -60,10 +60,10 @@ fn policy(logits: &[f32; ACTIONS]) -> ([f32; ACTIONS], [f32; ACTIONS]) {
     (log.map(f32::exp), log)
 }
 
-impl Learner {
+impl Twin {
     pub fn new() -> Self {
         let rng = &mut ChaCha8Rng::seed_from_u64(1);
-        let critics = [Trained::new(Shape::critic(), rng), Trained::new(Shape::critic(), rng)];
+        let critics = [TwinNetwork::new(Shape::critic(), rng), TwinNetwork::new(Shape::critic(), rng)];
         let (mut before, mut after, mut preferences) = (Batch::new(), Batch::new(), Vec::new());
         for _ in 0..SAMPLES {
             let sample_before = sample(rng);
@@ -72,7 +72,7 @@ impl Learner {
             after.push_sample(&sample(rng));
         }
         Self {
-            actor: Trained::new(Shape::actor(), rng),
+            actor: TwinNetwork::new(Shape::actor(), rng),
             targets: critics.each_ref().map(|critic| critic.parameters.clone()),
             critics,
             before,

@@ -160,7 +160,7 @@ struct References {
     bound_percent: Option<f32>,
 }
 
-/// Runs oracle and bound if asked, else takes them from the shipped file if it has these missions.
+/// Runs oracle and bound if requested, else takes them from the shipped file if it has these missions.
 fn references(arguments: &Arguments, places: &[Place]) -> Result<References> {
     let Some(tours) = arguments.oracle else {
         let is_nominal = arguments.cities.is_none()

@@ -1,4 +1,4 @@
-//! `evaluate` in a world that differs from what the policy is told.
+//! `evaluate` in a world that differs from the policy's model.
 
 use gleaner_host_trainer::judge::mismatch::{MapError, Mismatch};
 use gleaner_world::Fading;

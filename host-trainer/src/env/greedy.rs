@@ -1,4 +1,5 @@
-//! GREEDY, the paper's heuristic: fly to the nearest device, hover until it is empty, go on to the next, return in time.
+//! GREEDY, the paper's heuristic: fly to the nearest device, hover until it is empty, continue with the next, return in
+//! time.
 
 use crate::env::flight::Flight;
 use gleaner_units::{Action, Cell};

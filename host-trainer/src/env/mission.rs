@@ -8,7 +8,7 @@ use gleaner_world::{Realization, Scenario, ScenarioError, ScenarioKind, Seed, St
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Longest way between a random start and a random terminal, moves. The farthest corners of the default city are 68
+/// Longest distance between a random start and a random terminal, moves. Opposite corners of the default city are 68
 /// moves apart, and the smallest battery holds 50 units.
 const WAY_MAX: u32 = 45;
 /// Number of devices of a varied mission, K.

@@ -1,4 +1,4 @@
-//! Writes down an ONNX graph node by node.
+//! Builds an ONNX graph node by node.
 
 use gleaner_policy::onnx::Port;
 use gleaner_policy::onnx::pb::attribute_proto::AttributeType;
@@ -12,7 +12,7 @@ use gleaner_policy::onnx::pb::{
 /// Name of the batch dimension.
 const BATCH: &str = "N";
 
-/// A graph in the making. Values are called by name; every name is given once.
+/// An incomplete graph. Values are identified by unique names.
 pub(super) struct Builder(GraphProto);
 
 impl Builder {
@@ -52,7 +52,7 @@ impl Builder {
         name.into()
     }
 
-    /// A node with one output; the node bears its output's name.
+    /// A node with one output. Its name is that of the output.
     pub fn node(&mut self, operator: &str, inputs: &[&str], output: &str) -> String {
         self.node_with(operator, inputs, output, vec![])
     }
@@ -69,7 +69,7 @@ impl Builder {
         output.into()
     }
 
-    /// A node with several outputs; it bears the first one's name.
+    /// A node with several outputs. Its name is that of the first one.
     pub fn split_with(
         &mut self,
         operator: &str,

@@ -1,8 +1,8 @@
 //! The actor as an ONNX graph.
 //!
-//! Tokens of all samples lie under each other, `[N * 15, 64]`, so that every linear layer is one `Gemm` with the
-//! weight as the trainer keeps it. Absent devices are cut out three times: their features are replaced by zeros
-//! (whatever they held), nobody attends to them, and the pooling does not see them.
+//! The tokens of all samples are rows of one matrix, `[N * 15, 64]`, so that every linear layer is one `Gemm` with the
+//! weight in the trainer's layout. Absent devices are masked at three places: their features are set to zero, the
+//! attention gives them no weight, and the pooling skips them.
 
 use super::builder::{Builder, float, int, ints};
 use crate::net::{HEAD_WIDTH, HEADS, LAYER_NORM_EPSILON, LAYERS, Shape, WIDTH};
@@ -11,13 +11,13 @@ use gleaner_policy::onnx::{INPUTS, OUTPUTS};
 use gleaner_policy::schema::{self, Normalisation};
 use gleaner_policy::{FIRST_DEVICE_TOKEN, K_MAX, TOKENS};
 
-/// Added to the score of an absent key: far below any score, so that its weight is exactly zero after the
-/// softmax, and far above minus infinity, so that no engine makes a NaN of it.
+/// Added to the score of an absent key. It is far below any score, so that the weight after the softmax is exactly zero,
+/// and finite, so that no engine computes NaN.
 const MASKED_SCORE: f32 = -1e9;
-/// Stands for "less than any feature" in the pooling.
+/// Less than any feature: the value of absent devices in the pooling.
 const LOWEST: f32 = f32::MIN;
 
-/// The graph of an actor; inputs and outputs are [`INPUTS`] and [`OUTPUTS`].
+/// The graph of an actor with [`INPUTS`] and [`OUTPUTS`].
 pub(super) fn actor(parameters: &[f32], shape: Shape) -> GraphProto {
     let mut net = Net { graph: Builder::new("gleaner-policy", &INPUTS) };
     for tensor in shape.tensors() {
@@ -65,7 +65,7 @@ impl Net {
         graph.integers("split.tokens", &[1, 1, 1, K_MAX as i64]);
     }
 
-    /// `present` `[N,12,1]` as truth; `tokens.flag` `[N,15]` 1 or 0; `key_bias` `[N,1,1,15]`.
+    /// `present` `[N,12,1]`, boolean; `tokens.flag` `[N,15]`, 1 or 0; `key_bias` `[N,1,1,15]`.
     fn masks(&mut self) {
         let graph = &mut self.graph;
         let flat = graph.node("Greater", &["device_mask", "half"], "present.flat");
@@ -79,7 +79,7 @@ impl Net {
         graph.node("Unsqueeze", &[&bias, "axes.1_2"], "key_bias");
     }
 
-    /// Normalises and projects; gives the tokens `[N * 15, 64]`.
+    /// Normalises and projects; returns the tokens `[N * 15, 64]`.
     fn embed(&mut self) -> String {
         let uav = self.normalise("uav");
         let uav = self.project_one("project_uav", &uav);
@@ -97,7 +97,7 @@ impl Net {
         self.graph.node("Reshape", &[&tokens, "rows.width"], "tokens.rows")
     }
 
-    /// `((x + shift) / scale)`, clipped, by the schema's table; steps that change nothing are left out.
+    /// `((x + shift) / scale)`, clipped, from the schema's table. Operations without effect are left out.
     fn normalise(&mut self, tensor: &str) -> String {
         let table: Vec<Normalisation> = schema::normalisations(tensor).collect();
         let mut value = tensor.to_owned();
@@ -123,7 +123,7 @@ impl Net {
         value
     }
 
-    /// A token that every sample has once, `[N,1,64]`.
+    /// A token that each sample has once, `[N,1,64]`.
     fn project_one(&mut self, layer: &str, x: &str) -> String {
         let rows = self.linear(layer, x, &format!("{layer}.rows"));
         self.graph.node("Reshape", &[&rows, "per_sample.one"], &format!("{layer}.tokens"))
@@ -155,7 +155,7 @@ impl Net {
         self.graph.node_with("LayerNormalization", &inputs, &format!("{norm}.rows"), attributes)
     }
 
-    /// Attention among the tokens of each sample; leaves the weights `[N,4,15,15]` in `...weights`.
+    /// Attention among the tokens of each sample. The weights `[N,4,15,15]` are the value `...weights`.
     fn attend(&mut self, layer: usize, x: &str) -> String {
         let name = |part: &str| format!("encoder.{layer}.attention.{part}");
         let rows = self.linear(&format!("encoder.{layer}.qkv"), x, &name("qkv"));
@@ -179,7 +179,7 @@ impl Net {
         graph.node("Reshape", &[&mixed, "rows.width"], &name("mixed.rows"))
     }
 
-    /// The last layer's weights, mean over the heads, without the absent devices.
+    /// The last layer's weights, mean over the heads; zero for absent devices.
     fn attention_out(&mut self) {
         let weights = format!("encoder.{}.attention.weights", LAYERS - 1);
         let graph = &mut self.graph;
@@ -191,7 +191,7 @@ impl Net {
         graph.node("Mul", &[&rows, &keys], "attention");
     }
 
-    /// What the head reads, `[N,256]`: UAV, preference, map, and the largest of each device feature.
+    /// The head's inputs, `[N,256]`: UAV, preference, map, and the maximum of each device feature.
     fn pool(&mut self, rows: &str) -> String {
         let graph = &mut self.graph;
         let tokens = graph.node("Reshape", &[rows, "per_sample.tokens"], "encoded");

@@ -1,12 +1,12 @@
-//! From a parameter vector to the model file.
+//! Export of a parameter vector as a model file.
 //!
-//! [`export`] writes ONNX (operator set 17, standard operators only), with normalisation, masks and golden pairs
-//! inside. Every weight keeps the name and the layout that [`Shape::tensors`] gives it, so that other engines
-//! find it by name. What the file promises to its readers stands in [`gleaner_policy::onnx`].
+//! [`export`] writes ONNX (operator set 17, standard operators only) with normalisation, masks and golden pairs. Weights
+//! have the names and layouts of [`Shape::tensors`], so that other engines find them by name. [`gleaner_policy::onnx`]
+//! documents the file.
 //!
 //! # When you may trust it
-//! The workspace's tests compare exported networks with the trainer's own forward pass in tract and in
-//! onnxruntime. An exported file proves itself again wherever it is loaded.
+//! Tests of the workspace compare exported networks in tract and in onnxruntime with the trainer's forward pass. Every
+//! program that loads an exported file runs its self-test.
 
 mod builder;
 mod graph;
@@ -19,26 +19,26 @@ use gleaner_units::Action;
 
 pub use gleaner_policy::onnx::ModelCard;
 
-/// Operator set of the graph: the first with layer normalisation, and one that tract is tested with.
+/// Operator set of the graph: the first with layer normalisation, and one that tract supports.
 const OPERATOR_SET: i64 = 17;
-/// Version of the file format that came with [`OPERATOR_SET`].
+/// Version of the file format of [`OPERATOR_SET`].
 const IR_VERSION: i64 = 8;
 
-/// Why a network cannot become a model.
+/// Why a network cannot be exported.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ExportError {
     /// Not an actor.
     #[error("a network with {outputs} outputs is no actor: export the one with {}", Action::COUNT)]
     NotAnActor {
-        /// Outputs that it has.
+        /// Its outputs.
         outputs: usize,
     },
-    /// The parameters are those of another shape.
+    /// The number of parameters is wrong.
     #[error("{found} parameters do not fit the shape, which has {expected}")]
     Length {
-        /// What the shape asks for.
+        /// Parameters of the shape.
         expected: usize,
-        /// What was given.
+        /// Parameters given.
         found: usize,
     },
     /// The training diverged.
@@ -49,7 +49,7 @@ pub enum ExportError {
         /// Index in it.
         index: usize,
     },
-    /// A model that proves nothing would be refused everywhere.
+    /// No golden pairs: every program would refuse the model.
     #[error("no golden pair: give some observations")]
     NoGolden,
 }
@@ -57,7 +57,7 @@ pub enum ExportError {
 /// The bytes of the model file.
 ///
 /// # Errors
-/// [`ExportError`]; a file that is written can be loaded.
+/// [`ExportError`]. A file that is written can be loaded.
 pub fn export(
     actor: &[f32],
     shape: Shape,
@@ -92,10 +92,10 @@ pub fn export(
     Ok(onnx::seal(model, &metadata))
 }
 
-/// Golden pairs for these observations, computed by the trainer's own forward pass.
+/// Golden pairs for these observations, computed by the trainer's forward pass.
 ///
 /// # Panics
-/// When `shape` is no actor's or `actor` does not fit it.
+/// When `shape` is not that of an actor, or `actor` has another length.
 #[must_use]
 pub fn golden_pairs(actor: &[f32], shape: Shape, observations: &[Tokens]) -> Vec<Golden> {
     let mut batch = Batch::new();
@@ -115,7 +115,7 @@ pub fn golden_pairs(actor: &[f32], shape: Shape, observations: &[Tokens]) -> Vec
 /// The parameter vector of a model that [`export`] wrote, for [`Shape::actor`].
 ///
 /// # Errors
-/// The file is damaged or of another contract, or a weight is not there under its name.
+/// The file is damaged or of another contract, or lacks a weight.
 pub fn read_actor(bytes: &[u8]) -> Result<Vec<f32>, ModelError> {
     let (model, _, _) = onnx::unseal(bytes)?;
     let weights = model.graph.map(|graph| graph.initializer).unwrap_or_default();

@@ -38,12 +38,12 @@ fn what_is_written_can_be_loaded_and_read_back() {
     assert_eq!(read_actor(&file).unwrap(), actor);
     let answer = policy.infer(&observations[2]).unwrap();
     assert!((answer.logits[0] - goldens[2].logits[0]).abs() < 1e-5);
-    assert_ne!(goldens[1].logits, goldens[2].logits, "the pairs tell observations apart");
+    assert_ne!(goldens[1].logits, goldens[2].logits, "the pairs differ");
 }
 
 #[test]
 fn names_in_the_graph_are_unique() {
-    // Other engines look values up by name.
+    // Other engines find values by name.
     let graph = graph::actor(&fresh(), Shape::actor());
     let mut seen = HashSet::new();
     let values = graph.initializer.iter().map(|tensor| &tensor.name);

@@ -33,8 +33,7 @@ pub trait Decider {
         self.decide(&flights.iter().map(|(_, flight)| *flight).collect::<Vec<_>>())
     }
 
-    /// Who looks at whom in the second layer before the next action of this flight; `None` for a system without
-    /// attention.
+    /// Attention of the second layer for the next decision of this flight; `None` for a system without attention.
     ///
     /// # Errors
     /// The engine's own.

@@ -1,5 +1,4 @@
-//! What a policy looks at, and where it flies: the paper's attention analysis (section V-E) and its example missions
-//! (figure 5).
+//! The paper's attention analysis (section V-E) and its example missions (figure 5).
 
 use crate::env::flight::Flight;
 use crate::judge::evaluation::{Decider, DeciderError};
@@ -11,8 +10,8 @@ use std::sync::Arc;
 /// Names of the token kinds, in the order of [`Shares`] and of the tokens.
 pub const KINDS: [&str; 4] = ["UAV", "preference", "local map", "devices"];
 
-/// What each kind of token receives, as a share of all attention: the column sums of the attention matrix over the
-/// number of queries, summed by kind. The four add to one.
+/// Share of all attention that each kind of token receives: the column sums of the attention matrix, divided by the number
+/// of queries and summed by kind. The four shares sum to one.
 pub type Shares = [f32; KINDS.len()];
 
 /// The shares of one matrix; zeros for an empty one.
@@ -40,8 +39,8 @@ pub struct Gaze {
     pub along: Shares,
 }
 
-/// Flies every realization under one preference and looks over its shoulder; `None` for a system without attention.
-/// The example is `realizations[example]`.
+/// Flies every realization under one preference and records the attention; `None` for a system without attention. The
+/// example is `realizations[example]`.
 ///
 /// # Errors
 /// The decider failed.
@@ -82,7 +81,7 @@ pub fn watch(
 pub struct Track {
     /// Weight of data.
     pub w_data: f32,
-    /// Column and row of the cell at the beginning of each slot, and at last the terminal's.
+    /// Column and row of the cell at the start of each slot, and at the end those of the terminal.
     pub cells: Vec<(i16, i16)>,
     /// Column and row of each device, and the share of its data that was collected.
     pub devices: Vec<(i16, i16, f32)>,
@@ -92,7 +91,7 @@ pub struct Track {
     pub energy: f32,
 }
 
-/// Flies one mission and keeps the way.
+/// Flies one mission and records the path.
 ///
 /// # Errors
 /// The decider failed.

@@ -9,7 +9,7 @@ use gleaner_units::{Action, Sight};
 /// Decisions by [`Source`]: network, kept plan, device order, single move.
 pub type SourceCounts = [u64; 4];
 
-/// A policy with look-ahead. It has what the aircraft has: the map, the nominal channel, live SNR, positions and data.
+/// A policy with look-ahead. Its inputs are those on board: the map, the nominal channel, live SNR, positions and data.
 pub struct LookingAhead<'a, P> {
     policy: &'a mut P,
     budget: Budget,
@@ -27,7 +27,7 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
         LookingAhead { policy, budget, settings, has_map: true, flights: Vec::new(), sources: [0; 4] }
     }
 
-    /// Says whether there is a map of buildings on board; without one the policy decides alone.
+    /// Sets whether there is a map of buildings on board; without one the policy decides alone.
     #[must_use]
     pub const fn with_map(mut self, has_map: bool) -> LookingAhead<'a, P> {
         self.has_map = has_map;

@@ -1,7 +1,6 @@
-//! What the paper tests and what it prints: the settings, and every number that stands in its text or its table.
+//! The paper's test settings, and all numbers in its text and its table.
 //!
-//! Most of its results are figures without printed numbers. Where there is none, there is none here: nothing is read
-//! off a picture.
+//! Most of its results are figures without printed numbers. No number here is read off a figure.
 
 use crate::judge::evaluation::test_preferences;
 use gleaner_units::BatteryUnits;
@@ -32,7 +31,7 @@ impl Setting {
         all
     };
 
-    /// The setting that is trained in: K = 6, B = 80.
+    /// The trained setting: K = 6, B = 80.
     #[must_use]
     pub const fn trained(kind: ScenarioKind) -> Setting {
         Setting { kind, devices: 6, battery: 80 }
@@ -59,7 +58,7 @@ impl Setting {
         self.scenario().shortest_moves() as f32
     }
 
-    /// What the paper prints about this setting.
+    /// The paper's printed numbers for this setting.
     #[must_use]
     pub fn published(self) -> Published {
         use ScenarioKind::{ReachDestination as Rd, ReturnBase as Rb};
@@ -87,10 +86,10 @@ pub struct Published {
     pub least_energy: &'static str,
 }
 
-/// A printed number, and where it stands.
+/// A printed number and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Citation {
-    /// What was measured.
+    /// The measurement.
     pub what: &'static str,
     /// As printed, with its unit.
     pub value: &'static str,
@@ -102,7 +101,7 @@ const fn cite(what: &'static str, value: &'static str, place: &'static str) -> C
     Citation { what, value, place }
 }
 
-/// Every number of the paper's results that is printed.
+/// All printed numbers of the paper's results.
 pub const CITATIONS: [Citation; 25] = [
     cite("coverage at w = (1, 0), RD, K = 6, B = 80, MOSAC-ATT", "approximately 87 %", "section V-C"),
     cite("coverage at w = (1, 0), RB, K = 6, B = 80, MOSAC-ATT", "approximately 85 %", "section V-C"),
@@ -141,17 +140,16 @@ pub const EXAMPLES: [(ScenarioKind, f32, f32, f32); 6] = [
     (ScenarioKind::ReturnBase, 0.0, 2.0, 2.0),
 ];
 
-/// Limits that no system can pass in a setting in which at most `data_percent` of the data can be collected, in the
-/// mean: each mission uses at least the shortest mission's energy.
+/// Bounds on the results of any system in one setting, as means over its missions: data from above, energy from below.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Limits {
+pub struct Bounds {
     /// Percent of the data.
     pub data_percent: f32,
     /// Battery units.
     pub least_energy: f32,
 }
 
-impl Limits {
+impl Bounds {
     /// Upper bound of the hypervolume of the mean front: the rectangle of the best data and the least energy.
     #[must_use]
     pub fn hypervolume(self) -> f64 {
@@ -190,7 +188,7 @@ mod tests {
 
     #[test]
     fn limits_hold_for_the_best_that_can_be() {
-        let limits = Limits { data_percent: 100.0, least_energy: 32.0 };
+        let limits = Bounds { data_percent: 100.0, least_energy: 32.0 };
         assert_eq!(limits.hypervolume(), 101.0 * 168.0);
         assert!((limits.utility() - (50.0 - 16.0)).abs() < 1e-4);
     }

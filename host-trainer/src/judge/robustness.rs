@@ -56,8 +56,8 @@ mod tests {
     use gleaner_units::Action;
     use gleaner_world::Scenario;
 
-    /// GREEDY with one device to visit has no memory that outlives a slot before the device is empty; good enough to
-    /// tell channels apart.
+    /// GREEDY with one device to visit needs no memory from slot to slot before the device is empty, which suffices to
+    /// distinguish channels.
     struct FirstDevice;
 
     impl Decider for FirstDevice {

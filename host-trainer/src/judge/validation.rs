@@ -13,7 +13,7 @@ const VALIDATION_FROM: u64 = 10_000;
 const VALIDATION_COUNT: u64 = 60;
 /// The evaluation realizations (paper, section V-A: 100 fixed ones).
 const EVALUATION_COUNT: u64 = 100;
-/// What a wasted battery unit costs, in hypervolume.
+/// Price of a wasted battery unit, in hypervolume.
 const WASTE_PRICE: f64 = 100.0;
 
 /// Per scenario that is trained: name and validation table.
@@ -22,9 +22,9 @@ const WASTE_PRICE: f64 = 100.0;
 pub struct Tables(pub Vec<(String, Table)>);
 
 impl Tables {
-    /// What the best parameters are chosen by: the mean hypervolume over the scenarios, less `WASTE_PRICE` for every
-    /// battery unit that is wasted at w = (0, 1). Hypervolume hardly sees those, but whoever asks for energy alone must
-    /// get the shortest mission.
+    /// The score that selects the best parameters: the mean hypervolume over the scenarios, less `WASTE_PRICE` for each
+    /// battery unit wasted at w = (0, 1). Such units change the hypervolume little, but a mission for energy alone must be
+    /// the shortest one.
     #[must_use]
     pub fn score(&self) -> f64 {
         let hypervolumes: f64 = self.0.iter().map(|(_, table)| table.hypervolume).sum();

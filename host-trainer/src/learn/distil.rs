@@ -5,8 +5,8 @@
 //! each of them, and a student of the mean keeps the gain (ensemble distillation: Hinton, Vinyals and Dean 2015).
 //!
 //! The student flies and the teacher labels every state (DAgger: Ross, Gordon and Bagnell 2011), so that the student is
-//! trained on the states that it visits. Each example is shown in a random view. The loss is the cross entropy between
-//! the teacher's distribution and the masked policy.
+//! trained on the states that it visits. Each example is used in a random view. The loss is the cross entropy between the
+//! teacher's distribution and the masked policy.
 
 use crate::env::distribution::{ACTIONS, Distribution};
 use crate::env::flight::Flight;
@@ -50,7 +50,7 @@ pub struct DistilSettings {
     pub student_share: f64,
     /// Capacity of the memory of the shortest mission, examples: 4,000.
     pub shortest_kept: usize,
-    /// One example in so many of a batch is of the shortest mission: 4.
+    /// One in this number of a batch's examples is of the shortest mission: 4.
     pub shortest_every: usize,
     /// Step size of the running average of the actor, per update: 0.001.
     pub averaging: f32,
@@ -379,7 +379,7 @@ impl Trainer for Distillation {
         }
         let cross_entropy = self.learn();
         self.stored.update += 1;
-        // A plain mean at first, so that the average soon forgets the initial parameters.
+        // A plain mean at first, so that the initial parameters soon have no weight.
         let share = self.constants.averaging.max(1.0 / self.stored.update as f32);
         net::polyak(&mut self.stored.averaged, &self.stored.actor, share);
         Ok(CrossEntropy { cross_entropy })

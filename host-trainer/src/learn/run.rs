@@ -28,9 +28,9 @@ use std::path::Path;
 /// File name of the checkpoint inside the output folder.
 pub const CHECKPOINT: &str = "run.checkpoint";
 /// Step size of the running average of the policy's parameters, per update. The average is what is evaluated and
-/// exported, since single updates are noisy. It does not influence the training.
+/// exported, since single updates are noisy. It does not influence the training. The paper has none.
 const AVERAGING: f32 = 0.001;
-/// Share of the slots of a guided mission that GREEDY decides; the policy explores in the others.
+/// Share of the slots of a guided mission that GREEDY decides; the policy explores in the others. The paper has none.
 const GUIDED_SLOTS: f64 = 0.9;
 
 /// What an algorithm's encoding stores of a state.
@@ -63,7 +63,7 @@ struct ActiveFlight<O> {
 }
 
 impl<O: Clone> ActiveFlight<O> {
-    /// The guide's action. Call it exactly once per slot: the guide remembers its target.
+    /// The guide's action. Call it exactly once per slot: the guide stores its target.
     fn guide_action(&mut self) -> Option<Action> {
         self.guide.as_mut().map(|guide| guide.decide(&self.flight))
     }
@@ -277,7 +277,7 @@ impl<A: Algorithm> Trainer for OffPolicyRun<A> {
         let losses =
             self.algorithm.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
         self.update += 1;
-        // A plain mean at first, so that the average soon forgets the initial parameters.
+        // A plain mean at first, so that the initial parameters soon have no weight.
         let share = AVERAGING.max(1.0 / self.update as f32);
         net::polyak(&mut self.averaged, self.algorithm.policy_parameters(), share);
         Ok(losses)
@@ -307,8 +307,8 @@ impl<A: Algorithm> Trainer for OffPolicyRun<A> {
     }
 }
 
-/// Preferences to relabel a batch with: pure ones in their share, which a uniform draw never gives, else uniform. The
-/// flights have the full share of pure preferences; half of it is enough here.
+/// Preferences to relabel a batch with: a share of pure ones, which a uniform draw never gives, and uniform ones. Flights
+/// have the full share of pure preferences; half of it is enough here.
 fn relabelling(settings: &Settings, rng: &mut ChaCha8Rng) -> Vec<Preference> {
     let share = settings.pure_preferences / 2.0;
     (0..settings.batch * settings.preferences)

@@ -1,4 +1,4 @@
-//! What the learners ask of a network.
+//! The interface between a learning algorithm and a network.
 
 use super::batch::Batch;
 use super::shape::{Shape, Tensor};
@@ -8,32 +8,31 @@ use rand_chacha::ChaCha8Rng;
 use std::fmt::Debug;
 use std::ops::Range;
 
-/// A network over a flat parameter vector: what a learner needs to know of it.
+/// A network whose parameters are one flat vector.
 ///
-/// A batch holds samples; a sample is a state under a preference. How the samples are packed, and what copies of one
-/// state share, is the network's own business.
+/// A batch holds samples; a sample is a state under a preference. Each network packs its samples in its own way.
 pub trait Architecture: Copy + Debug {
-    /// Samples, packed.
+    /// Packed samples.
     type Batch: Samples;
-    /// Memory of the passes, kept from call to call.
+    /// Memory for the passes, reused by every call.
     type Workspace: Clone + Debug + Default;
 
-    /// This network with so many outputs.
+    /// The same network with this number of outputs.
     fn with_outputs(outputs: usize) -> Self;
 
-    /// Outputs a sample.
+    /// Outputs per sample.
     fn outputs(&self) -> usize;
 
     /// Every tensor in the order of the flat vector, without gaps.
     fn tensors(&self) -> Vec<Tensor>;
 
-    /// Fresh parameters.
+    /// Random initial parameters.
     fn initialise(&self, rng: &mut ChaCha8Rng) -> Vec<f32>;
 
     /// The outputs, `[samples, outputs]`.
     ///
     /// # Panics
-    /// When `parameters` does not have the length that the network asks for.
+    /// When `parameters` has another length than the network's.
     fn forward<'a>(
         &self,
         parameters: &[f32],
@@ -41,11 +40,11 @@ pub trait Architecture: Copy + Debug {
         workspace: &'a mut Self::Workspace,
     ) -> &'a [f32];
 
-    /// The outputs, and to `gradients` the gradient of a loss is added. `loss` is called with a range of samples,
-    /// their outputs, and the place for the gradients by these outputs, all of which it must write.
+    /// The outputs. Adds the gradient of a loss to `gradients`. `loss` receives a range of samples and their outputs, and
+    /// writes the loss's gradient with respect to each of these outputs.
     ///
     /// # Panics
-    /// When a length does not fit.
+    /// When a length does not match.
     fn forward_backward<'a>(
         &self,
         parameters: &[f32],
@@ -61,9 +60,9 @@ pub trait Architecture: Copy + Debug {
     }
 }
 
-/// A batch that can be filled anew.
+/// A batch that can be refilled.
 pub trait Samples: Clone + Debug + Default {
-    /// Forgets the samples and keeps the memory.
+    /// Removes the samples and keeps the memory.
     fn clear(&mut self);
 }
 

@@ -1,8 +1,7 @@
 //! Multi-head attention among the tokens of each sample, forward and backward.
 //!
-//! The tokens of a sample lie at scattered rows of the chunk's matrices (see
-//! [`super::workspace::Tokens`]). A sample has at most fifteen tokens, so one row of scores fits
-//! [`Lanes`]; the spare lanes hold probability 0.
+//! The tokens of a sample are scattered rows of the chunk's matrices (see [`super::workspace::Tokens`]). A sample has at
+//! most 15 tokens, so one row of scores fits into one [`Lanes`]; the unused lanes hold probability 0.
 
 use super::lanes::{LANES, Lanes, vectorised};
 use super::shape::{HEAD_WIDTH, WIDTH};
@@ -21,7 +20,7 @@ fn head_of(qkv: &[f32], row: u32, part: usize, head: usize) -> Lanes {
     Lanes::load(&qkv[start..])
 }
 
-/// The rows of one part of a head as columns: lane `j` of entry `c` is number `c` of token `j`.
+/// One part of a head, transposed: lane `j` of entry `c` is number `c` of token `j`.
 #[inline(always)]
 fn columns_of(qkv: &[f32], rows: &[u32], part: usize, head: usize) -> [Lanes; HEAD_WIDTH] {
     let mut columns = [Lanes::ZERO; HEAD_WIDTH];
@@ -44,7 +43,7 @@ fn combine<const FUSED: bool>(weights: Lanes, columns: &[Lanes; HEAD_WIDTH]) -> 
     sum
 }
 
-/// 0 for the first `tokens` lanes, minus infinity for the spare ones.
+/// 0 for the first `tokens` lanes, minus infinity for the others.
 #[inline(always)]
 fn mask(tokens: usize) -> Lanes {
     let mut mask = Lanes::splat(f32::NEG_INFINITY);
@@ -135,8 +134,8 @@ fn attend_backward_body<const FUSED: bool>(
 vectorised! {
     /// Softmax(q k^T / 4) v for each sample and head.
     ///
-    /// `qkv` is `[tokens, 3 WIDTH]`; `mixed` gets `[tokens, WIDTH]`, the heads side by side;
-    /// `probabilities` gets, sample after sample, `[HEADS, tokens of the sample, LANES]`.
+    /// `qkv` is `[tokens, 3 WIDTH]`. `mixed` receives `[tokens, WIDTH]`, head by head; `probabilities` receives
+    /// `[HEADS, tokens of the sample, LANES]` for each sample.
     pub(super) fn attend(
         tokens: &Tokens,
         qkv: &[f32],
@@ -146,7 +145,7 @@ vectorised! {
 }
 
 vectorised! {
-    /// Writes to `d_qkv` the gradient that `d_mixed` means for `qkv`.
+    /// Writes the gradient with respect to `qkv` to `d_qkv`, from `d_mixed`, that with respect to the result.
     pub(super) fn attend_backward(
         tokens: &Tokens,
         qkv: &[f32],

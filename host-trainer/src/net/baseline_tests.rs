@@ -1,4 +1,4 @@
-//! The properties of the networks that the paper compares with.
+//! Properties of the paper's baseline networks.
 
 use super::*;
 use rand::{RngExt, SeedableRng};
@@ -13,7 +13,7 @@ fn preferences(rng: &mut ChaCha8Rng, count: usize) -> Vec<[f32; 2]> {
     (0..count).map(|_| [number(rng), number(rng)]).collect()
 }
 
-/// As many states as there are counts, each under so many preferences.
+/// One state for each count, under that number of preferences.
 trait Drawn: Architecture {
     fn draw(rng: &mut ChaCha8Rng, copies: &[usize]) -> Self::Batch;
 }
@@ -48,7 +48,7 @@ fn loss(outputs: &[f32], weights: &[f32]) -> f64 {
     terms.map(|(&o, &w)| f64::from(o) * f64::from(w) + 0.5 * f64::from(o).powi(2)).sum()
 }
 
-/// Each tensor's gradient along its own direction, and some single numbers of it.
+/// Each tensor's gradient: along its own direction, and some of its entries.
 fn agrees_with_finite_differences<N: Drawn>(copies: &[usize]) {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let network = N::with_outputs(10);
@@ -75,7 +75,7 @@ fn agrees_with_finite_differences<N: Drawn>(copies: &[usize]) {
             }
             loss_at(&moved)
         };
-        // Small, because rectifiers have kinks; the frozen run of PyTorch is the sharper test.
+        // Small, because ReLU is not differentiable at 0. `tests/pytorch_fixture.rs` tests more sharply.
         let measured = (shifted(3e-4) - shifted(-3e-4)) / 6e-4;
         assert!((measured - norm).abs() < 1e-2 * norm + 2e-3, "{}: {measured}, {norm}", tensor.name);
         let largest = gradient.iter().map(|g| f64::from(g.abs())).fold(0.0, f64::max);
@@ -107,7 +107,7 @@ fn gradients_on_vectors_agree_with_finite_differences() {
     agrees_with_finite_differences::<VectorShape>(&[1, 3, 0, 2]);
 }
 
-/// A state under many preferences gives what it gives under each alone.
+/// Several preferences for one state give the same outputs as each alone.
 fn copies_share_only_work<N: Drawn>(push: impl Fn(&mut N::Batch, &mut ChaCha8Rng, &[[f32; 2]])) {
     let mut rng = ChaCha8Rng::seed_from_u64(12);
     let network = N::with_outputs(5);

@@ -1,4 +1,4 @@
-//! What goes in: samples, and batches packed to the devices that are present.
+//! Inputs: samples, and batches that hold only the devices that are present.
 
 use super::shape::{DEVICE_FEATURES, DEVICES_MAX, MAP_CELLS, PREFERENCE_FEATURES, UAV_FEATURES};
 use gleaner_policy::{LOCAL_MAP_SIDE, View};
@@ -6,7 +6,7 @@ use gleaner_policy::{LOCAL_MAP_SIDE, View};
 /// Normalised features of one device.
 pub type DeviceFeatures = [f32; DEVICE_FEATURES];
 
-/// One normalised observation, of a fixed size so that a replay memory may hold it in place.
+/// One normalised observation. Its size is fixed, so that a replay memory can store it without allocation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Spare battery, battery, terminal dx, terminal dy; normalised.
@@ -17,7 +17,7 @@ pub struct Sample {
     pub local_map: [f32; MAP_CELLS],
     /// Normalised devices; the first `device_count` are present.
     pub devices: [DeviceFeatures; DEVICES_MAX],
-    /// How many devices are present, at most [`DEVICES_MAX`].
+    /// Number of devices present, at most [`DEVICES_MAX`].
     pub device_count: u8,
 }
 
@@ -28,7 +28,7 @@ impl Sample {
         &self.devices[..usize::from(self.device_count)]
     }
 
-    /// The same, turned and mirrored.
+    /// The same, rotated and mirrored.
     #[must_use]
     pub fn seen(&self, view: View) -> Sample {
         let mut seen = *self;
@@ -61,9 +61,9 @@ impl Default for Sample {
     }
 }
 
-/// Samples packed one after another, each kind of token in its own matrix.
+/// Packed samples. Each kind of token has its own matrix.
 ///
-/// Keeps its memory across [`Batch::clear`].
+/// [`Batch::clear`] keeps the memory.
 #[derive(Clone, Debug)]
 pub struct Batch {
     /// `[samples, UAV_FEATURES]`.
@@ -74,7 +74,7 @@ pub struct Batch {
     pub(super) local_map: Vec<f32>,
     /// `[devices of all samples, device_features]`.
     pub(super) devices: Vec<f32>,
-    /// First device of each sample and, last, the number of all devices: `[samples + 1]`.
+    /// Index of each sample's first device, and at the end the number of all devices: `[samples + 1]`.
     pub(super) first_device: Vec<usize>,
 }
 
@@ -97,7 +97,7 @@ impl Batch {
         Self::default()
     }
 
-    /// Forgets the samples and keeps the memory.
+    /// Removes the samples and keeps the memory.
     pub fn clear(&mut self) {
         self.uav.clear();
         self.preference.clear();
@@ -106,8 +106,8 @@ impl Batch {
         self.first_device.truncate(1);
     }
 
-    /// Appends one sample of normalised features, as many as the network's [`super::Shape`] says; `devices` are those
-    /// present, in any order.
+    /// Appends one sample of normalised features with the sizes of [`super::Shape`]. `devices` are those present, in any
+    /// order.
     ///
     /// # Panics
     /// With more than [`DEVICES_MAX`] devices.
@@ -126,7 +126,7 @@ impl Batch {
         self.first_device.push(self.device_total() + devices.len());
     }
 
-    /// Appends a sample as it is.
+    /// Appends a sample.
     pub fn push_sample(&mut self, sample: &Sample) {
         self.push(&sample.uav, &sample.preference, &sample.local_map, sample.devices_present());
     }
@@ -137,7 +137,7 @@ impl Batch {
         self.first_device.len() - 1
     }
 
-    /// True without samples.
+    /// Whether there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

@@ -1,7 +1,7 @@
-//! Convolutions without padding, as matrix products over unfolded maps.
+//! Convolutions without padding, as matrix products over unfolded maps (im2col).
 //!
-//! Maps lie row by row from the south-west, the channels of a cell side by side: `[height][width][channels]`. A kernel
-//! lies the same way, so a patch of a map is as many runs of numbers as the kernel is high.
+//! The layout of maps and kernels is `[height][width][channels]`, row by row from the south-west. Each row of a patch is
+//! therefore one contiguous run of numbers.
 
 use super::matrix::{CutWeights, Panels};
 use super::rowwise::rectify_backward;
@@ -10,25 +10,25 @@ use super::shape::{Linear, Ruler};
 /// Cells along a kernel's side (paper, section V-B).
 pub const KERNEL: usize = 5;
 
-/// One layer and the size of the maps that enter it.
+/// One layer and the size of its input maps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Convolution {
-    /// One row a filter: `[KERNEL][KERNEL][channels]`.
+    /// One row per filter: `[KERNEL][KERNEL][channels]`.
     pub linear: Linear,
     width: usize,
     height: usize,
     channels: usize,
 }
 
-/// What a layer keeps of one chunk, and the gradients on their way back.
+/// Activations and gradients of a layer for one chunk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ConvolutionMemory {
     /// `[maps x places, KERNEL * KERNEL * channels]`.
     patches: Vec<f32>,
-    /// `[maps x places, filters]`, after the rectifier.
+    /// `[maps x places, filters]`, after ReLU.
     pub out: Vec<f32>,
     d_patches: Vec<f32>,
-    /// The gradient of `out`.
+    /// Gradient with respect to `out`.
     pub d_out: Vec<f32>,
 }
 
@@ -37,23 +37,23 @@ impl Convolution {
         Self { linear: ruler.linear(KERNEL * KERNEL * channels, filters), width, height, channels }
     }
 
-    /// Width and height of what comes out.
+    /// Width and height of the output maps.
     pub const fn size_out(&self) -> (usize, usize) {
         (self.width + 1 - KERNEL, self.height + 1 - KERNEL)
     }
 
-    /// Numbers of one map that comes out.
+    /// Numbers of one output map.
     pub const fn numbers_out(&self) -> usize {
         let (width, height) = self.size_out();
         width * height * self.linear.outputs
     }
 
-    /// Numbers of one run of a patch.
+    /// Numbers in one row of a patch.
     const fn run(&self) -> usize {
         KERNEL * self.channels
     }
 
-    /// Calls `each` with where in a map each run of each patch begins, patch by patch.
+    /// Calls `each` with the index in the map of each row of each patch, patch by patch.
     fn runs(&self, mut each: impl FnMut(usize)) {
         let (width_out, height_out) = self.size_out();
         for y in 0..height_out {
@@ -82,7 +82,8 @@ impl Convolution {
         self.linear.forward_rectified(parameters, weights, &memory.patches, &mut memory.out);
     }
 
-    /// From `memory.d_out`: the gradient of the parameters, and into `d_maps`, if there is one, that of the maps.
+    /// From `memory.d_out`: adds the gradient with respect to the parameters, and writes that with respect to the maps to
+    /// `d_maps` if it is given.
     pub fn backward(
         &self,
         weights: &CutWeights,

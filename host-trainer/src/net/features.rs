@@ -1,4 +1,4 @@
-//! The feed-forward network on a feature vector (paper, MOSAC-FTV): the head alone.
+//! The feed-forward network on a feature vector (paper, MOSAC-FTV): only the head.
 
 use super::architecture::{Architecture, Samples};
 use super::head::{HeadLayout, HeadMemory, Preferences};
@@ -7,17 +7,17 @@ use super::shape::{DEVICES_MAX, PREFERENCE_FEATURES, Ruler, Tensor, UAV_FEATURES
 use rand_chacha::ChaCha8Rng;
 use std::ops::Range;
 
-/// Numbers of a device, those of the paper: the first ones of its token.
+/// Features of a device that the paper uses: the first ones of its token.
 pub const VECTOR_DEVICE_FEATURES: usize = 5;
-/// Numbers of a state: the UAV, then a place for each device that there may be.
+/// Features of a state: the UAV, then [`DEVICES_MAX`] devices.
 pub const VECTOR_FEATURES: usize = UAV_FEATURES + DEVICES_MAX * VECTOR_DEVICE_FEATURES;
-/// States that go through the network together.
+/// States that are computed together.
 const CHUNK: usize = 32;
 
-/// The network; the sizes that do not vary are constants of this module.
+/// The network. Its fixed sizes are constants of this module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VectorShape {
-    /// Outputs a sample.
+    /// Outputs per sample.
     pub outputs: usize,
 }
 
@@ -30,7 +30,7 @@ pub struct VectorBatch {
 }
 
 impl VectorBatch {
-    /// Appends a state, once under each of the preferences. Normalised; places without a device hold zeros.
+    /// Appends a normalised state under each of the preferences. Absent devices are zeros.
     pub fn push(&mut self, state: &[f32; VECTOR_FEATURES], preferences: &[[f32; PREFERENCE_FEATURES]]) {
         self.numbers.extend_from_slice(state);
         self.preferences.push(preferences);
@@ -48,7 +48,7 @@ impl Samples for VectorBatch {
     }
 }
 
-/// Memory of the passes.
+/// Memory for the passes.
 #[derive(Clone, Debug, Default)]
 pub struct VectorWorkspace {
     forward_weights: CutWeights,
@@ -60,7 +60,7 @@ pub struct VectorWorkspace {
 }
 
 impl VectorShape {
-    /// The head and the number of all parameters.
+    /// The head, and the number of parameters.
     fn layout(self) -> (HeadLayout, usize) {
         let mut ruler = Ruler::default();
         (HeadLayout::new(&mut ruler, VECTOR_FEATURES, self.outputs), ruler.len)
@@ -140,7 +140,7 @@ impl Architecture for VectorShape {
     }
 }
 
-/// `0..count` in pieces of at most `size`.
+/// `0..count` in ranges of at most `size`.
 pub(super) fn chunks(count: usize, size: usize) -> impl Iterator<Item = Range<usize>> {
     (0..count).step_by(size).map(move |first| first..count.min(first + size))
 }

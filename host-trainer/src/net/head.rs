@@ -1,7 +1,8 @@
-//! The head of the baselines: what is known of a state, then the preference beside it, then two hidden layers.
+//! The head of the baseline networks: a latent vector of the state, concatenated with the preference, then two hidden
+//! layers.
 //!
-//! A batch holds each state once and any number of preferences for it. What does not depend on the preference, and
-//! that is everything before the first hidden layer's rectifier, is worked out once a state.
+//! A batch holds each state once, with any number of preferences. Everything before the first hidden layer's ReLU, except
+//! the preference's part of the sum, depends on the state only and is computed once per state.
 
 use super::architecture::Samples;
 use super::matrix::{CutWeights, Panels};
@@ -13,12 +14,12 @@ use std::ops::Range;
 /// Neurons of both hidden layers (paper, section V-B).
 pub const HIDDEN: usize = 256;
 
-/// Where the head lies in the flat vector.
+/// Place of the head in the flat vector.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HeadLayout {
-    /// The first layer's part for the state, with the bias.
+    /// First layer: weights of the state, and the bias.
     pub state: Linear,
-    /// The first layer's part for the preference.
+    /// First layer: weights of the preference.
     pub preference: Linear,
     pub second: Linear,
     pub last: Linear,
@@ -43,7 +44,7 @@ impl HeadLayout {
         names.into_iter().zip(self.linears()).flat_map(|(name, linear)| linear.tensors(name))
     }
 
-    /// State and preference enter the first layer side by side, so both count as its inputs.
+    /// State and preference are both inputs of the first layer, so both count for its initialisation.
     pub fn initialise(&self, parameters: &mut [f32], rng: &mut impl Rng) {
         let first = self.state.inputs + self.preference.inputs;
         for (linear, inputs) in self.linears().into_iter().zip([first, first, HIDDEN, HIDDEN]) {
@@ -52,12 +53,12 @@ impl HeadLayout {
     }
 }
 
-/// Which samples are of which state, and their preferences.
+/// The preferences, and the state that each sample belongs to.
 #[derive(Clone, Debug)]
 pub(super) struct Preferences {
     /// `[samples, PREFERENCE_FEATURES]`.
     numbers: Vec<f32>,
-    /// First sample of each state and, last, the number of all samples: `[states + 1]`.
+    /// Index of each state's first sample, and at the end the number of all samples: `[states + 1]`.
     first_sample: Vec<usize>,
 }
 
@@ -89,7 +90,7 @@ impl Preferences {
         self.first_sample[self.states()]
     }
 
-    /// The samples of some states.
+    /// The samples of a range of states.
     pub fn of(&self, states: Range<usize>) -> Range<usize> {
         self.first_sample[states.start]..self.first_sample[states.end]
     }
@@ -98,18 +99,18 @@ impl Preferences {
         &self.numbers[samples.start * PREFERENCE_FEATURES..samples.end * PREFERENCE_FEATURES]
     }
 
-    /// How many samples each of some states has.
+    /// Number of samples of each state in a range.
     fn copies(&self, states: Range<usize>) -> impl Iterator<Item = usize> {
         self.first_sample[states.start..=states.end].windows(2).map(|ends| ends[1] - ends[0])
     }
 }
 
-/// What the head keeps of one chunk, and the gradients on their way back.
+/// Activations and gradients of the head for one chunk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct HeadMemory {
     /// `[states, HIDDEN]`: the first layer before the preference.
     of_states: Vec<f32>,
-    /// `[samples, HIDDEN]`, after the rectifier.
+    /// `[samples, HIDDEN]`, after ReLU.
     first: Vec<f32>,
     second: Vec<f32>,
     d_of_states: Vec<f32>,
@@ -119,7 +120,7 @@ pub(super) struct HeadMemory {
 }
 
 impl HeadMemory {
-    /// From the latent vectors of some states to the outputs of their samples.
+    /// Computes the outputs of a range of states from their latent vectors.
     pub fn forward(
         &mut self,
         layout: &HeadLayout,
@@ -143,7 +144,7 @@ impl HeadMemory {
         layout.last.forward(parameters, weights, &self.second, outputs);
     }
 
-    /// The way back of the same chunk; leaves the gradient of the latent vectors in `d_state` when `further`.
+    /// Backward pass of the same chunk. With `further`, the gradient with respect to the latent vectors is in `d_state`.
     pub fn backward(
         &mut self,
         layout: &HeadLayout,

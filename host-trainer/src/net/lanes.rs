@@ -1,18 +1,17 @@
-//! Sixteen numbers at a time, and the choice of the processor's vector unit at run time.
+//! Vectors of sixteen numbers, and the selection of the instruction set at run time.
 //!
-//! The build targets the plainest processor of its kind, so the inner loops are compiled several
-//! times by [`vectorised!`] and the widest that the processor has is called. The loops are written
-//! over [`Lanes`], so the order of the sums, and with it every bit of the result, is the same on
-//! AVX2 and on AVX-512; the portable version rounds differently because it has no fused
-//! multiply-add.
+//! The build targets the baseline processor of its architecture. [`vectorised!`] therefore compiles the inner loops for
+//! several instruction sets, and calls the widest that the processor supports. The loops use [`Lanes`], so the order of the
+//! sums and every bit of the result are the same with AVX2 and AVX-512. The portable version rounds differently, because it
+//! has no fused multiply-add.
 
-/// How many numbers [`Lanes`] holds.
+/// Numbers in [`Lanes`].
 pub(super) const LANES: usize = 16;
 
-/// True where the portable version has a fast fused multiply-add.
+/// Whether the portable version has a fast fused multiply-add.
 pub(super) const PORTABLE_FUSED: bool = cfg!(target_arch = "aarch64");
 
-/// Compiles `$body` for each vector unit, and defines `$name` to call the widest.
+/// Compiles `$body` for each instruction set, and defines `$name` to call the widest.
 macro_rules! vectorised {
     ($(#[$doc:meta])* $vis:vis fn $name:ident($($arg:ident: $ty:ty),* $(,)?) = $body:ident) => {
         $(#[$doc])*
@@ -62,7 +61,7 @@ pub(super) fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// Sixteen numbers. The loops over them become vector instructions.
+/// Sixteen numbers. The compiler turns loops over them into vector instructions.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 pub(super) struct Lanes(pub [f32; LANES]);
@@ -130,7 +129,7 @@ impl Lanes {
         self
     }
 
-    /// The sum, added in halves.
+    /// The sum, by adding halves.
     #[inline(always)]
     pub fn sum(self) -> f32 {
         let mut v = self.0;

@@ -27,9 +27,9 @@ pub const GLOBAL_SIZE: (usize, usize) = (15, 11);
 pub const GLOBAL_WINDOW: usize = 5;
 /// Filters of each convolution.
 const FILTERS: usize = 16;
-/// Convolutions one after another.
+/// Convolutions in sequence.
 const DEPTH: usize = 2;
-/// States that go through the network together: their patches stay in the second-level cache.
+/// States that are computed together: their patches fit into the second-level cache.
 const CHUNK: usize = 8;
 
 /// Numbers of a local map.
@@ -37,14 +37,14 @@ pub const LOCAL_NUMBERS: usize = LOCAL_SIDE * LOCAL_SIDE * MAP_CHANNELS;
 /// Numbers of a global map.
 pub const GLOBAL_NUMBERS: usize = GLOBAL_SIZE.0 * GLOBAL_SIZE.1 * MAP_CHANNELS;
 
-/// The network; the sizes that do not vary are constants of this module.
+/// The network. Its fixed sizes are constants of this module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapShape {
-    /// Outputs a sample.
+    /// Outputs per sample.
     pub outputs: usize,
 }
 
-/// States under preferences. Maps lie row by row from the south-west, the channels of a cell side by side.
+/// States under preferences. The layout of maps is `[height][width][channels]`, row by row from the south-west.
 #[derive(Clone, Debug, Default)]
 pub struct MapBatch {
     local: Vec<f32>,
@@ -55,8 +55,8 @@ pub struct MapBatch {
 }
 
 impl MapBatch {
-    /// Appends a state, once under each of the preferences; gives its local and its global map, all zeros, to be
-    /// painted.
+    /// Appends a state under each of the preferences. Returns its local and its global map, all zeros, for the caller to
+    /// draw.
     pub fn push(
         &mut self,
         battery: f32,
@@ -71,7 +71,7 @@ impl MapBatch {
         (local, global)
     }
 
-    /// The maps of the state that was appended last.
+    /// The maps of the last state.
     #[must_use]
     pub fn last(&self) -> Option<(&[f32; LOCAL_NUMBERS], &[f32; GLOBAL_NUMBERS])> {
         self.local.last_chunk().zip(self.global.last_chunk())
@@ -92,7 +92,7 @@ impl Samples for MapBatch {
     }
 }
 
-/// Where everything lies, in the order of the flat vector.
+/// Places of all layers, in the order of the flat vector.
 #[derive(Clone, Copy, Debug)]
 struct MapLayout {
     /// Local, then global.
@@ -119,7 +119,7 @@ impl MapLayout {
     }
 }
 
-/// Memory of the passes.
+/// Memory for the passes.
 #[derive(Clone, Debug, Default)]
 pub struct MapWorkspace {
     forward_weights: CutWeights,
@@ -134,7 +134,7 @@ pub struct MapWorkspace {
 }
 
 impl MapWorkspace {
-    /// Both branches of some states, into `latent`.
+    /// Computes both branches of a range of states into `latent`.
     fn forward_maps(
         &mut self,
         layout: &MapLayout,
@@ -162,7 +162,7 @@ impl MapWorkspace {
         }
     }
 
-    /// The way back from the gradient of `latent`.
+    /// Backward pass from the gradient with respect to `latent`.
     fn backward_maps(&mut self, layout: &MapLayout, gradients: &mut [f32]) {
         let mut first_number = 0;
         for (layers, memory) in layout.branches.iter().zip(&mut self.branches) {

@@ -1,11 +1,10 @@
-//! The networks: forward, backward, Adam. Written out by hand, on one thread.
+//! The networks: forward pass, backward pass, Adam, on one thread.
 //!
-//! [`Shape`] is the attention network that flies; [`MapShape`] and [`VectorShape`] are those that the paper compares
-//! it with. What a learner asks of any of them is [`Architecture`]. The rest of this page is about the first.
+//! [`Shape`] is the attention network of the shipped policy; [`MapShape`] and [`VectorShape`] are the paper's baselines.
+//! All implement [`Architecture`]. The rest of this page describes the attention network.
 //!
-//! One flat `f32` vector holds all parameters of a network; [`Shape::tensors`] says what lies
-//! where. A sample is a set of tokens: UAV, preference, local map, and one for each device that is
-//! present. A [`Batch`] packs samples without padding.
+//! One flat `f32` vector holds all parameters of a network; [`Shape::tensors`] lists them. A sample is a set of tokens: UAV,
+//! preference, local map, and one for each device that is present. A [`Batch`] packs samples without padding.
 //!
 //! ```text
 //! uav 4 ───────► 64 ┐
@@ -16,24 +15,24 @@
 //! ```
 //!
 //! # When you may trust it
-//! - Gradients agree with finite differences, and outputs, losses and three Adam steps with a
-//!   frozen run of PyTorch (`tests/pytorch_fixture.rs`).
-//! - The same batch gives the same bits on every run on one machine, and on any processor with
-//!   AVX2 as far as the code of this module goes.
-//! - Inputs are taken as they are: normalise before.
+//! - Gradients agree with finite differences. Outputs, losses and three Adam steps agree with a recorded run of PyTorch
+//!   (`tests/pytorch_fixture.rs`).
+//! - The same batch gives the same bits in every run on one machine. This module also gives the same bits on all processors
+//!   with AVX2.
+//! - Inputs must be normalised.
 //!
 //! # Tensors for an exporter
-//! Names, offsets and sizes come from [`Shape::tensors`]; a weight is `[outputs, inputs]` row by
-//! row and means `y = x W^T + b`:
+//! Names, offsets and sizes come from [`Shape::tensors`]. A weight is stored as `[outputs, inputs]`, row by row, and the
+//! layer computes `y = x W^T + b`:
 //!
 //! | name | size | |
 //! |---|---|---|
-//! | `project_uav`, `project_preference`, `project_map`, `project_device` `.weight` `.bias` | 64 x 4, 2, 81, 5 | |
+//! | `project_uav`, `project_preference`, `project_map`, `project_device` `.weight` `.bias` | 64 x 4, 2, 81, 7 | |
 //! | `encoder.{0,1}.qkv` `.weight` `.bias` | 192 x 64 | rows 0..64 queries, 64..128 keys, 128..192 values; head h has rows 16 h .. 16 h + 16 of each |
 //! | `encoder.{0,1}.out` `.weight` `.bias` | 64 x 64 | |
 //! | `encoder.{0,1}.norm1`, `.norm2` `.weight` `.bias` | 64 | epsilon 1e-5, biased variance |
-//! | `encoder.{0,1}.ff1`, `.ff2` `.weight` `.bias` | 128 x 64, 64 x 128 | rectifier between |
-//! | `head.0`, `head.1` `.weight` `.bias` | 64 x 256, outputs x 64 | input order uav, preference, map, pooled; rectifier between |
+//! | `encoder.{0,1}.ff1`, `.ff2` `.weight` `.bias` | 128 x 64, 64 x 128 | ReLU between |
+//! | `head.0`, `head.1` `.weight` `.bias` | 64 x 256, outputs x 64 | input order uav, preference, map, pooled; ReLU between |
 //!
 //! Scores are divided by 4, the root of the head width. Pooling over no devices gives zeros.
 

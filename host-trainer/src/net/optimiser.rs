@@ -1,13 +1,13 @@
-//! What changes parameters: Adam, and the slow following of target networks.
+//! Updates of parameters: Adam, and the Polyak average of target networks.
 
 use super::lanes::{multiply_add, vectorised};
 
-/// Adam (Kingma and Ba 2015) as PyTorch does it, without weight decay.
+/// Adam (Kingma and Ba 2015) as in PyTorch, without weight decay.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Adam {
-    /// First moments, one a parameter.
+    /// First moment of each parameter's gradient.
     pub m: Vec<f32>,
-    /// Second moments, one a parameter.
+    /// Second moment of each parameter's gradient.
     pub v: Vec<f32>,
     /// Steps taken.
     pub step: u64,
@@ -22,7 +22,7 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Adam for `count` parameters, with the usual decays 0.9 and 0.999.
+    /// Adam for `count` parameters, with the decays 0.9 and 0.999 of the paper.
     #[must_use]
     pub fn new(count: usize, lr: f32) -> Self {
         Self {
@@ -36,7 +36,7 @@ impl Adam {
         }
     }
 
-    /// One step down the gradient.
+    /// One descent step.
     ///
     /// # Panics
     /// When the lengths differ.
@@ -102,7 +102,7 @@ vectorised! {
     fn follow(target: &mut [f32], source: &[f32], tau: f32) = follow_body
 }
 
-/// Moves `target` towards `source` by the fraction `tau`.
+/// `target = (1 - tau) target + tau source`.
 ///
 /// # Panics
 /// When the lengths differ.

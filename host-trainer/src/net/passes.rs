@@ -1,4 +1,4 @@
-//! The forward and the backward pass.
+//! Forward and backward pass.
 
 use super::attention::{attend, attend_backward};
 use super::batch::Batch;
@@ -9,13 +9,13 @@ use super::workspace::{Activations, CHUNK, LayerActivations, Scratch, Tokens, Wo
 
 /// Runs the network on a batch; returns the outputs, `[samples, shape.outputs]`.
 ///
-/// Keeps in `workspace` what [`backward`] needs.
+/// Stores the activations that [`backward`] needs in `workspace`.
 ///
 /// # Panics
-/// When `parameters` does not have the length that `shape` asks for.
+/// When `parameters` has another length than `shape`.
 ///
 /// # Cost
-/// About 0.64 million multiply-adds a sample with six devices.
+/// About 0.64 million multiply-adds per sample with six devices.
 pub fn forward<'a>(
     shape: &Shape,
     parameters: &[f32],
@@ -37,8 +37,8 @@ pub fn forward<'a>(
     &workspace.outputs
 }
 
-/// The outputs of [`forward`], to the last bit, without keeping what [`backward`] needs: one chunk's memory serves all,
-/// so that large batches stay in the cache. After it, [`Workspace::attention`] knows the last chunk only.
+/// The outputs of [`forward`], bit for bit, without the activations for [`backward`]. All chunks use the same memory, so
+/// that large batches stay in the cache. Afterwards [`Workspace::attention`] is valid for the last chunk only.
 pub fn answer<'a>(
     shape: &Shape,
     parameters: &[f32],
@@ -59,12 +59,12 @@ pub fn answer<'a>(
     &workspace.outputs
 }
 
-/// Adds to `gradients` the gradient of a loss whose gradient by the outputs is `d_outputs`.
+/// Adds the gradient of a loss to `gradients`, from `d_outputs`, its gradient with respect to the outputs.
 ///
 /// `workspace` must come from [`forward`] with the same shape, parameters and batch.
 ///
 /// # Panics
-/// When a length does not fit `shape` and `batch`.
+/// When a length does not match `shape` and `batch`.
 pub fn backward(
     shape: &Shape,
     parameters: &[f32],
@@ -84,11 +84,11 @@ pub fn backward(
     }
 }
 
-/// [`forward`] and [`backward`] in one, a few samples at a time, so that the activations are still
-/// in the cache on the way back. The same result to the last bit.
+/// [`forward`] and [`backward`] chunk by chunk, so that the activations are still in the cache for the backward pass. The
+/// result is the same bit for bit.
 ///
-/// `loss` is called with a range of samples, their outputs `[samples, outputs]`, and the place for
-/// the gradients by these outputs, all of which it must write.
+/// `loss` receives a range of samples and their outputs `[samples, outputs]`, and writes the loss's gradient with respect
+/// to each of these outputs.
 pub fn forward_backward(
     shape: &Shape,
     parameters: &[f32],
@@ -120,7 +120,7 @@ pub fn forward_backward(
     scratch.d_outputs = d_outputs;
 }
 
-/// A network and its weights cut for one direction.
+/// A network, and its weights in panels for one pass.
 #[derive(Clone, Copy)]
 struct Net<'a> {
     layout: &'a Layout,
@@ -190,8 +190,7 @@ fn forward_layer(
     );
 }
 
-/// Lays the three fixed tokens and the maximum over the devices side by side; the maximum over no
-/// devices is 0.
+/// Concatenates the three fixed tokens and the maximum over the devices. Without devices the maximum is 0.
 fn join(tokens: &Tokens, x: &[f32], joined: &mut [f32], pooled_from: &mut [u32]) {
     let places = joined.chunks_exact_mut(HEAD_INPUTS).zip(pooled_from.chunks_exact_mut(WIDTH));
     for ((_, rows), (joined, from)) in tokens.samples().zip(places) {
@@ -253,7 +252,8 @@ fn backward_chunk(
     }
 }
 
-/// Turns `scratch.d_tokens` from the gradient of the layer's output into that of its input `x`.
+/// Backward pass of one encoder layer. On entry `scratch.d_tokens` is the gradient with respect to the layer's output, on
+/// return that with respect to its input `x`.
 fn backward_layer(
     net: Net<'_>,
     encoder: &EncoderLayout,
@@ -284,7 +284,7 @@ fn backward_layer(
     encoder.qkv.add_backward_input(weights, d_qkv, d);
 }
 
-/// The way back through [`join`].
+/// Backward pass of [`join`].
 fn separate(tokens: &Tokens, d_joined: &[f32], pooled_from: &[u32], d_tokens: &mut [f32]) {
     let places = d_joined.chunks_exact(HEAD_INPUTS).zip(pooled_from.chunks_exact(WIDTH));
     for ((_, rows), (d_joined, from)) in tokens.samples().zip(places) {

@@ -1,4 +1,4 @@
-//! What happens to each row on its own: layer norm, rectifier, bias.
+//! Operations on each row alone: layer norm, ReLU, bias.
 
 use super::lanes::{LANES, Lanes, vectorised};
 use super::shape::{LAYER_NORM_EPSILON, WIDTH};
@@ -118,8 +118,8 @@ fn add_rows_body<const FUSED: bool>(rows: &[f32], sums: &mut [f32]) {
 }
 
 vectorised! {
-    /// `x = norm(x + skip) * gain + bias` for each row of [`WIDTH`]; keeps what the backward pass
-    /// needs: the normalised rows and one over each row's standard deviation.
+    /// `x = norm(x + skip) * gain + bias` for each row of [`WIDTH`]. Stores the normalised rows and the inverse of each row's
+    /// standard deviation for the backward pass.
     pub(super) fn add_and_norm(
         skip: &[f32],
         gain: &[f32],
@@ -131,8 +131,8 @@ vectorised! {
 }
 
 vectorised! {
-    /// Turns `d`, the gradient of the norm's output, into that of its input; adds to the gradients
-    /// of gain and bias.
+    /// Backward pass of the norm: on entry `d` is the gradient with respect to its output, on return that with respect to its
+    /// input. Adds to the gradients of gain and bias.
     pub(super) fn norm_backward(
         gain: &[f32],
         normalised: &[f32],
@@ -151,11 +151,11 @@ pub(super) fn rectify(x: &mut [f32]) {
 }
 
 vectorised! {
-    /// Clears `d` where the rectifier's output was 0.
+    /// Backward pass of ReLU: sets `d` to 0 where the output was 0.
     pub(super) fn rectify_backward(rectified: &[f32], d: &mut [f32]) = rectify_backward_body
 }
 
 vectorised! {
-    /// Adds every row of a matrix with `sums.len()` columns to `sums`.
+    /// Adds all rows of a matrix with `sums.len()` columns to `sums`.
     pub(super) fn add_rows(rows: &[f32], sums: &mut [f32]) = add_rows_body
 }

@@ -1,64 +1,41 @@
-//! The sizes of the network, and where each tensor lies in the flat parameter vector.
+//! The sizes of the network, and the place of each tensor in the flat parameter vector.
 
-use gleaner_policy::schema::FEATURES;
+use gleaner_policy::schema;
 use rand::{Rng, RngExt};
 
-/// Width of a token and of everything the encoder passes on.
+/// Width of a token, and of the encoder's input and output.
 pub const WIDTH: usize = 64;
-/// Attention heads a layer.
+/// Attention heads per layer.
 pub const HEADS: usize = 4;
 /// Width of one head.
 pub const HEAD_WIDTH: usize = WIDTH / HEADS;
 /// Encoder layers.
 pub const LAYERS: usize = 2;
-/// Most devices a sample may hold: K_max of the observation contract.
+/// Most devices in a sample: K_max of the observation contract.
 pub const DEVICES_MAX: usize = gleaner_policy::K_MAX;
 /// Tokens that every sample has: UAV, preference and local map, in this order.
 pub const FIXED_TOKENS: usize = 3;
 /// Tokens of a sample with every device present.
 pub const TOKENS_MAX: usize = FIXED_TOKENS + DEVICES_MAX;
 /// Features of the UAV token.
-pub const UAV_FEATURES: usize = feature_count("uav");
-/// Features of one device token of the policy that flies.
-pub const DEVICE_FEATURES: usize = feature_count("devices");
+pub const UAV_FEATURES: usize = schema::UAV_FEATURES;
+/// Features of one device token of the shipped policy.
+pub const DEVICE_FEATURES: usize = schema::DEVICE_FEATURES;
 /// Features of the preference token.
-pub const PREFERENCE_FEATURES: usize = feature_count("preference");
-/// Numbers of the local map of the policy that flies.
+pub const PREFERENCE_FEATURES: usize = schema::PREFERENCE_FEATURES;
+/// Numbers of the local map of the shipped policy.
 pub const MAP_CELLS: usize = gleaner_policy::LOCAL_MAP_CELLS;
-/// What the head reads: UAV, preference, map and the pooled devices.
+/// Inputs of the head: UAV, preference, map and the pooled devices.
 pub const HEAD_INPUTS: usize = 4 * WIDTH;
 /// Added to the variance in every layer norm.
 pub const LAYER_NORM_EPSILON: f32 = 1e-5;
-
-/// Features of one token in the observation schema, so that a new feature changes the schema only.
-const fn feature_count(tensor: &str) -> usize {
-    let (mut count, mut index) = (0, 0);
-    while index < FEATURES.len() {
-        if is_same(FEATURES[index].tensor.as_bytes(), tensor.as_bytes()) {
-            count += 1;
-        }
-        index += 1;
-    }
-    count
-}
-
-const fn is_same(a: &[u8], b: &[u8]) -> bool {
-    let mut index = 0;
-    while index < a.len() && index < b.len() {
-        if a[index] != b[index] {
-            return false;
-        }
-        index += 1;
-    }
-    a.len() == b.len()
-}
 
 /// The sizes that differ between networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Shape {
     /// Numbers of the local map.
     pub map_cells: usize,
-    /// Numbers of one device.
+    /// Features of one device.
     pub device_features: usize,
     /// Hidden width of the feed-forward block of each encoder layer.
     pub feed_forward: usize,
@@ -68,7 +45,7 @@ pub struct Shape {
     pub outputs: usize,
 }
 
-/// One tensor in the flat vector, stored row by row as PyTorch stores it.
+/// One tensor in the flat vector, stored row by row as in PyTorch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tensor {
     /// Dotted name, e.g. `encoder.0.qkv.weight`.
@@ -82,29 +59,29 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// How many numbers the tensor holds.
+    /// Numbers in the tensor.
     #[must_use]
     pub fn len(&self) -> usize {
         self.rows * self.cols
     }
 
-    /// True for a tensor without numbers; no tensor of a [`Shape`] is.
+    /// Whether it has no numbers; never true for a tensor of a [`Shape`].
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The tensor's numbers within the flat vector.
+    /// The tensor's numbers in the flat vector.
     #[must_use]
     pub fn of<'a>(&self, parameters: &'a [f32]) -> &'a [f32] {
         &parameters[self.offset..self.offset + self.len()]
     }
 }
 
-/// Where a linear layer `y = x W^T + b` lies: the weight `[outputs, inputs]`, then the bias, if it has one.
+/// Place of a linear layer `y = x W^T + b`: the weight `[outputs, inputs]`, then the bias if it has one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Linear {
-    /// Its place among the layers of its network.
+    /// Its index among the layers of its network.
     pub index: usize,
     pub offset: usize,
     pub inputs: usize,
@@ -112,12 +89,12 @@ pub(super) struct Linear {
     pub biased: bool,
 }
 
-/// Lays linear layers out one after another.
+/// Assigns consecutive places to linear layers.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Ruler {
-    /// Numbers laid out so far.
+    /// Numbers so far.
     pub len: usize,
-    /// Layers laid out so far.
+    /// Layers so far.
     pub count: usize,
 }
 
@@ -156,8 +133,8 @@ impl Linear {
         if self.biased { vec![weight, bias] } else { vec![weight] }
     }
 
-    /// Draws weight and bias as PyTorch does by default: uniform in +-1/sqrt(inputs) (Kaiming uniform with
-    /// a = sqrt 5); `inputs` counts those of a layer beside this one whose sum with it is one layer.
+    /// Draws weight and bias with PyTorch's default: uniform in +-1/sqrt(inputs) (Kaiming uniform with a = sqrt 5). Where
+    /// the sum of two layers forms one layer, `inputs` counts the inputs of both.
     pub fn initialise(&self, inputs: usize, parameters: &mut [f32], rng: &mut impl Rng) {
         let bound = 1.0 / (inputs as f32).sqrt();
         let (weight, bias) = self.split_mut(parameters);
@@ -166,7 +143,7 @@ impl Linear {
         }
     }
 
-    /// The weight's and the bias's part of a vector of gradients.
+    /// Weight and bias in a vector of gradients.
     pub fn split_mut<'a>(&self, gradients: &'a mut [f32]) -> (&'a mut [f32], &'a mut [f32]) {
         let weights = self.inputs * self.outputs;
         let biases = if self.biased { self.outputs } else { 0 };
@@ -174,7 +151,7 @@ impl Linear {
     }
 }
 
-/// Where a layer norm lies: the gain, then the bias, each `[WIDTH]`.
+/// Place of a layer norm: the gain, then the bias, each `[WIDTH]`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Norm {
     pub offset: usize,
@@ -194,7 +171,7 @@ impl Norm {
     }
 }
 
-/// Where one encoder layer lies.
+/// Places of one encoder layer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EncoderLayout {
     pub qkv: Linear,
@@ -205,7 +182,7 @@ pub(super) struct EncoderLayout {
     pub norm2: Norm,
 }
 
-/// Where everything lies, in the order of the flat vector.
+/// Places of all layers, in the order of the flat vector.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
     pub project_uav: Linear,
@@ -226,7 +203,7 @@ impl Layout {
         let project_map = linear(shape.map_cells, WIDTH);
         let project_device = linear(shape.device_features, WIDTH);
         let encoder = std::array::from_fn(|_| {
-            // A norm is as long as a linear layer with one input: a gain and a bias.
+            // A norm has the length of a linear layer with one input.
             let qkv = linear(WIDTH, 3 * WIDTH);
             let out = linear(WIDTH, WIDTH);
             let norm1 = Norm { offset: linear(1, WIDTH).offset };
@@ -268,7 +245,7 @@ impl Layout {
 }
 
 impl Shape {
-    /// The actor that flies: five logits, 89,989 parameters.
+    /// The actor of the shipped policy: five logits, 89,989 parameters.
     #[must_use]
     pub const fn actor() -> Self {
         Self {
@@ -316,7 +293,7 @@ impl Shape {
         tensors
     }
 
-    /// Fresh parameters as PyTorch draws them by default; gains 1, norm biases 0.
+    /// Random initial parameters with PyTorch's defaults; gains 1, norm biases 0.
     #[must_use]
     pub fn initialise(&self, rng: &mut impl Rng) -> Vec<f32> {
         let layout = Layout::new(*self);

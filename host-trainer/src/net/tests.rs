@@ -1,4 +1,4 @@
-//! Properties that need no outside reference.
+//! Properties that need no external reference.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -25,7 +25,7 @@ fn random_batch(rng: &mut ChaCha8Rng, device_counts: &[usize]) -> Batch {
     batch
 }
 
-/// Parameters with random norms too, so that no gradient is special.
+/// Parameters with random gains and biases of the norms, so that no gradient is a special case.
 fn random_parameters(rng: &mut ChaCha8Rng, shape: Shape) -> Vec<f32> {
     let mut parameters = shape.initialise(rng);
     for tensor in shape.tensors().iter().filter(|tensor| tensor.name.contains("norm")) {
@@ -69,8 +69,8 @@ fn gradients_agree_with_finite_differences() {
                 }
                 loss(forward(&shape, &moved, &batch, &mut workspace), &weights)
             };
-            // Rectifiers and the maximum have kinks, which a long step crosses; a short one drowns in rounding. The
-            // frozen run of PyTorch is the sharper test.
+            // ReLU and maximum are not differentiable everywhere, so a long step is inexact; a short one is dominated by
+            // rounding. `tests/pytorch_fixture.rs` tests more sharply.
             let measured = [5e-4, 1e-4].map(|h| (shifted(h) - shifted(-h)) / (2.0 * h));
             let tolerance = 5e-3 * norm + 1e-3;
             let agrees = measured.iter().any(|measured| (measured - norm).abs() < tolerance);
@@ -79,7 +79,7 @@ fn gradients_agree_with_finite_differences() {
     }
 }
 
-/// A gradient of single numbers too, so that a wrong direction cannot hide in a norm.
+/// Some entries of the gradient alone: a wrong direction can have the right norm.
 #[test]
 fn single_gradients_agree_with_finite_differences() {
     let mut rng = ChaCha8Rng::seed_from_u64(SEED + 1);

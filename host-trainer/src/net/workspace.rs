@@ -1,4 +1,4 @@
-//! Memory of the two passes, kept from call to call.
+//! Memory for the two passes, reused by every call.
 
 use std::ops::Range;
 
@@ -7,21 +7,21 @@ use super::lanes::LANES;
 use super::matrix::{CutWeights, Panels};
 use super::shape::{FIXED_TOKENS, HEAD_INPUTS, HEADS, LAYERS, Shape, TOKENS_MAX, WIDTH};
 
-/// Probabilities kept for one token: a row of [`LANES`] for each head.
+/// Attention probabilities of one token: [`LANES`] for each head.
 pub(super) const KEPT: usize = HEADS * LANES;
 
-/// Samples that go through the whole network together: few enough for their activations to stay
-/// in the second-level cache. Fixed, because the sums of gradients depend on it.
+/// Samples that are computed together: their activations fit into the second-level cache. Fixed, because the sums of
+/// gradients depend on it.
 pub(super) const CHUNK: usize = 16;
 
-/// Which rows of a chunk's matrices hold the tokens of which sample.
+/// The rows of each sample's tokens in a chunk's matrices.
 ///
-/// Rows are ordered by kind: all UAVs, all preferences, all maps, then all devices, so that each
-/// projector writes one block. A sample's tokens are UAV, preference, map, then its devices.
+/// Rows are in the order of the kinds: all UAVs, all preferences, all maps, all devices, so that each projector writes
+/// one block. A sample's tokens are in the order UAV, preference, map, devices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tokens {
     rows: Vec<u32>,
-    /// Where each sample starts in `rows`, and the end: `[samples + 1]`.
+    /// Index in `rows` of each sample's first token, and the end: `[samples + 1]`.
     starts: Vec<usize>,
 }
 
@@ -41,18 +41,18 @@ impl Tokens {
         }
     }
 
-    /// Rows in all.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
     }
 
-    /// For each sample, how many tokens come before it and its rows.
+    /// For each sample: the number of tokens before it, and its rows.
     pub fn samples(&self) -> impl Iterator<Item = (usize, &[u32])> {
         self.starts.windows(2).map(|ends| (ends[0], &self.rows[ends[0]..ends[1]]))
     }
 }
 
-/// What one encoder layer keeps for the backward pass. Matrices have one row a token.
+/// Activations of one encoder layer for the backward pass. Matrices have one row per token.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LayerActivations {
     pub qkv: Vec<f32>,
@@ -65,11 +65,11 @@ pub(super) struct LayerActivations {
     pub hidden: Vec<f32>,
     pub normalised2: Vec<f32>,
     pub inverse_deviation2: Vec<f32>,
-    /// After the second norm: what the layer passes on.
+    /// After the second norm: the layer's output.
     pub out: Vec<f32>,
 }
 
-/// What the forward pass of one chunk keeps.
+/// Activations of one chunk for the backward pass.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Activations {
     pub samples: Range<usize>,
@@ -79,13 +79,13 @@ pub(super) struct Activations {
     pub layers: [LayerActivations; LAYERS],
     /// `[samples, HEAD_INPUTS]`: UAV, preference, map, pooled devices.
     pub joined: Vec<f32>,
-    /// `[samples, WIDTH]`: the row that each pooled number came from.
+    /// `[samples, WIDTH]`: the row of each maximum.
     pub pooled_from: Vec<u32>,
     pub hidden: Vec<f32>,
 }
 
 impl Activations {
-    /// Makes room for the samples of one chunk.
+    /// Sets the sizes for the samples of one chunk.
     pub fn prepare(&mut self, shape: Shape, batch: &Batch, samples: Range<usize>) {
         assert!(
             batch.local_map.len() == batch.len() * shape.map_cells
@@ -118,7 +118,7 @@ impl Activations {
         self.samples = samples;
     }
 
-    /// The chunk's part of each of the batch's matrices: UAVs, preferences, maps, devices; so many columns each.
+    /// The chunk's part of the batch's matrices (UAVs, preferences, maps, devices) with these numbers of columns.
     pub fn inputs<'a>(&self, batch: &'a Batch, columns: [usize; 4]) -> [&'a [f32]; 4] {
         let part = |matrix: &'a [f32], rows: &Range<usize>, columns: usize| {
             &matrix[rows.start * columns..rows.end * columns]
@@ -132,7 +132,7 @@ impl Activations {
     }
 }
 
-/// Gradients of activations while they are on their way back through one chunk.
+/// Gradients with respect to the activations of one chunk.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     pub panels: Panels,
@@ -146,7 +146,7 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
-    /// Makes room for one chunk; what the matrices hold is left over from another.
+    /// Sets the sizes for one chunk. The matrices keep old values.
     pub fn prepare(&mut self, chunk: &Activations) {
         let layer = &chunk.layers[0];
         for (matrix, like) in [
@@ -162,8 +162,8 @@ impl Scratch {
     }
 }
 
-/// All memory that [`super::forward`] and [`super::backward`] need. It grows to the largest batch
-/// seen and is never given back; nothing is allocated once it is large enough.
+/// All memory for [`super::forward`] and [`super::backward`]. It grows to the largest batch and never shrinks, so that later
+/// passes do not allocate.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     pub(super) forward_weights: CutWeights,
@@ -187,11 +187,9 @@ impl Workspace {
         &self.outputs
     }
 
-    /// Attention of the second layer in the last [`super::forward`], mean over the heads, as
-    /// `[query][key]`.
+    /// Attention of the second layer in the last [`super::forward`], mean over the heads, as `[query][key]`.
     ///
-    /// Token order: UAV, preference, local map, devices. Rows and columns of absent devices are 0;
-    /// every other row sums to 1.
+    /// Token order: UAV, preference, local map, devices. Rows and columns of absent devices are 0; all other rows sum to 1.
     ///
     /// # Panics
     /// When `sample` was not in the batch.

@@ -1,5 +1,5 @@
-//! The oracle: what a planner that knows map, channel and devices plans for. A strong lower bound of the optimum, not
-//! the optimum.
+//! The oracle: the best tours that a planner with full knowledge of map, channel and devices finds. Its results are a
+//! tight lower bound of the optimum.
 
 use crate::env::flight::Reward;
 use crate::judge::evaluation::{Missions, test_preferences};
@@ -21,13 +21,12 @@ pub struct OracleSetting {
     pub battery: u16,
     /// Realizations 0 to N - 1.
     pub realizations: u64,
-    /// What the best tours bring in the mean.
+    /// Expected results of the best tours.
     pub missions: Missions,
-    /// Percent of the data at w = (1, 0) that nobody can exceed, for the first realizations; empty when it was not
-    /// computed.
+    /// Upper bound on the data at w = (1, 0), percent, for the first realizations; empty if it was not computed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub upper_bound_percent: Vec<f32>,
-    /// How many parts of each mission's possibilities were looked at for that.
+    /// Nodes of each bound's branch-and-bound tree.
     #[serde(default, skip_serializing_if = "is_none")]
     pub bound_parts: u32,
 }
@@ -46,20 +45,25 @@ impl OracleSetting {
         Some(OracleSetting {
             realizations: count,
             missions: Missions(missions?),
-            // The mean over fewer missions is another one.
+            // Means over other realizations are not comparable.
             upper_bound_percent: self.upper_bound_percent.get(..len).unwrap_or_default().to_vec(),
             ..self.clone()
         })
     }
 }
 
-/// How hard to look for the best tour of a mission under one preference: two searches, one of them from the best
-/// tour of the preference before.
+/// Effort for the best tour of a mission under one preference. There are two searches: from scratch, and from the best tour
+/// of the previous preference.
 #[derive(Clone, Copy, Debug)]
 pub struct Thoroughness {
-    /// Tours that each search flies in the mean.
+    /// Tours that each search evaluates.
     pub tours: u32,
 }
+
+/// Temperatures of the search from scratch, first and last, utility.
+const FROM_SCRATCH: [f32; 2] = [5.0, 0.03];
+/// Temperatures of the search from the previous preference's tour, utility.
+const FROM_PREVIOUS: [f32; 2] = [1.5, 0.03];
 
 /// One mission under every test preference: percent of data, and minus battery units.
 #[must_use]
@@ -73,10 +77,11 @@ pub fn consult(rates: &Rates, realization: &Realization, thoroughness: Thoroughn
         .map(|preference| {
             let problem =
                 Problem { model: &known, state: &state, w_data: preference.w_data().min(W_DATA_MAX) };
-            let anew = Effort { tours: thoroughness.tours, temperatures: [5.0, 0.03] };
-            let onward = Effort { tours: thoroughness.tours, temperatures: [1.5, 0.03] };
-            let first = problem.anneal(Tour::default(), anew, &mut rng);
-            let second = problem.anneal(tour.clone(), onward, &mut rng);
+            let search = |from, temperatures, rng: &mut ChaCha8Rng| {
+                problem.anneal(from, Effort { tours: thoroughness.tours, temperatures }, rng)
+            };
+            let first = search(Tour::default(), FROM_SCRATCH, &mut rng);
+            let second = search(tour.clone(), FROM_PREVIOUS, &mut rng);
             tour = if second.0 > first.0 { second.1 } else { first.1 };
             let mut end = state;
             end.finish(&known, &tour);

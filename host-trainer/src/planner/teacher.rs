@@ -1,13 +1,14 @@
-//! The teacher: a planner with full knowledge of map, channel and devices that plans as a pupil could.
+//! The teacher of the distillation: a planner with full knowledge of map, channel and devices, whose decisions a student
+//! can learn from the policy's observation.
 //!
-//! A plan is a list of devices to visit in order, then the terminal. At each stop the aircraft goes as near as the stop
-//! says and hovers until the device is empty. Plans are judged by flying them in the mean: each slot brings what the
-//! channel's expected rate says, from whichever device is heard best in the mean. The best one is searched by
-//! insertion, removal, exchange, and by how near each stop is.
+//! A plan is a sequence of stops, each a device and a radius, and then the terminal. At a stop the aircraft flies to within
+//! the radius of the device and hovers until the device is empty. The value of a plan is its utility in a mean flight: in
+//! each slot the device with the highest mean SNR sends at its expected rate. Local search over insertions, removals,
+//! moves and reversals of stops, and over their radii, finds the plan.
 //!
-//! [`crate::planner`] finds better tours. It is the worse teacher: it hovers wherever the map makes it pay, and its
-//! search is random, so its pupils, who see neither, learned more slowly (RD, w = (1, 0), after 6,000 updates: 68 %
-//! of the data against 72 %).
+//! The search of [`crate::planner`] finds better tours but is the worse teacher. It hovers at any cell, and it is random;
+//! neither can be predicted from the observation. After 6,000 updates (RD, w = (1, 0)) its students collected 68 % of the
+//! data, and the students of this planner 72 %.
 
 use crate::env::distribution::Distribution;
 use crate::env::flight::Flight;
@@ -19,34 +20,37 @@ use gleaner_units::{Action, Cell, Grid};
 use gleaner_world::{Realization, World};
 use std::sync::Arc;
 
-/// What counts as empty, data units: a thousandth of a device.
+/// A device with less data counts as empty, data units: a thousandth of its initial data.
 const EMPTY_UNITS: f32 = 5.0;
-
-/// A stop short of the device must hear it at least so well, data units per slot: clear of buildings.
+/// Least expected rate at a stop, data units per slot: a link without buildings in between.
 const NEAR_UNITS: f32 = 300.0;
-/// Utility that makes an action e times less likely to be taught.
-const INDIFFERENCE: f32 = 0.1;
-/// The largest weight of data that is planned with.
+/// Temperature of the labels: a loss of this utility divides the probability of an action by e.
+const LABEL_TEMPERATURE: f32 = 0.1;
+/// Largest weight of data in the utility. With data alone, all tours that use up the battery would be equal.
 const W_DATA_MAX: f32 = 0.9;
-/// Orders of all stops from which the first search begins, each in both directions.
+/// Initial orders of all stops in the first search, each in both directions.
 const RESTARTS: usize = 3;
-/// How near a stop may be, cells.
+/// Radii of a stop, cells.
 const RADII: [u32; 5] = [0, 1, 2, 4, 6];
+/// Radius of a stop when it is inserted, cells.
+const FIRST_RADIUS: u32 = 2;
+/// Least gain of a change that the local search accepts, utility.
+const GAIN_MIN: f32 = 1e-3;
 
-/// A device to visit, and how near to go: hovering a few cells short saves moves and costs rate.
+/// A device to visit, and the radius within which to hover. A larger radius saves moves and lowers the rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stop {
     device: usize,
     radius: u32,
 }
 
-/// Makes the courses of missions.
+/// Studies missions.
 #[derive(Debug)]
 pub struct Teacher {
     rates: Rates,
 }
 
-/// One mission as the teacher knows it: per device and cell, mean SNR (dB) and expected data per slot.
+/// The teacher's model of one mission: per device and cell, mean SNR (dB) and expected data per slot.
 #[derive(Clone, Debug)]
 pub struct Course {
     grid: Grid,
@@ -55,7 +59,7 @@ pub struct Course {
     tour: Option<Vec<Stop>>,
 }
 
-/// Where a plan begins.
+/// The state from which a plan starts.
 struct Start<'a> {
     cell: Cell,
     battery: f32,
@@ -64,7 +68,7 @@ struct Start<'a> {
     preference: Preference,
 }
 
-/// A tour under way, without any chance in it.
+/// A flight with expected rates in place of random ones.
 struct MeanFlight {
     cell: Cell,
     battery: f32,
@@ -96,7 +100,7 @@ impl Teacher {
         Teacher { rates: Rates::new(world) }
     }
 
-    /// What there is to know about a mission.
+    /// The model of a mission.
     #[must_use]
     pub fn study(&self, realization: &Realization) -> Course {
         let grid = self.rates.grid();
@@ -111,8 +115,8 @@ impl Teacher {
 }
 
 impl Course {
-    /// The action that begins the best tour that is found from where the flight is, inside the guard's mask.
-    /// Remembers the tour, and begins the next search from it.
+    /// The first action, inside the guard's mask, of the best tour found from the flight's present state. The next search
+    /// starts from this tour.
     ///
     /// # Panics
     /// When the flight is over.
@@ -121,8 +125,8 @@ impl Course {
         self.plan(flight).0
     }
 
-    /// [`Course::advise`], and what each action is worth when the tour is flown after it: a distribution over
-    /// the allowed actions, in which those that lose nothing share the probability.
+    /// [`Course::advise`], and a label: the softmax of the utilities of the allowed actions, each followed by the tour. Actions
+    /// that lose no utility share the probability.
     ///
     /// # Panics
     /// When the flight is over.
@@ -139,9 +143,9 @@ impl Course {
             if !ends {
                 self.finish(&mut next, guard, &devices, &tour);
             }
-            logits[action.index()] = self.utility(&start, &next) / INDIFFERENCE;
+            logits[action.index()] = self.utility(&start, &next) / LABEL_TEMPERATURE;
         }
-        // What the search found is the best known, whatever the mean flight of another action promises.
+        // No action gets a higher probability than the search's result.
         let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         logits[advice.index()] = highest;
         (advice, Distribution::new(&logits, flight.mask()).probability)
@@ -169,16 +173,16 @@ impl Course {
         (advice, start, devices)
     }
 
-    /// From the tour of the last slot, or at first from several beginnings: no stop, and all stops in a few orders.
+    /// The best tour found: from the tour of the previous slot, or at first from no stops and from all stops in some orders.
     fn search(&self, start: &Start<'_>, devices: &[Cell]) -> Vec<Stop> {
         if let Some(tour) = &self.tour {
             let left =
                 tour.iter().copied().filter(|stop| start.remaining[stop.device] > EMPTY_UNITS).collect();
             return self.improve(start, devices, left).1;
         }
-        let mut beginnings = vec![Vec::new()];
+        let mut initial_tours = vec![Vec::new()];
         for turn in 0..RESTARTS.min(devices.len()) {
-            // By angle around the middle of the city, begun at another device each time.
+            // By angle around the middle of the city, each time from another device.
             let middle = (f32::from(self.grid.width()) / 2.0, f32::from(self.grid.height()) / 2.0);
             let angle = |device: &usize| {
                 libm::atan2f(
@@ -193,23 +197,24 @@ impl Course {
                 let by = turn * order.len() / RESTARTS.min(devices.len());
                 order.rotate_left(by);
             }
-            let stops = |order: &[usize]| order.iter().map(|&device| Stop { device, radius: 2 }).collect();
-            beginnings.push(stops(&order));
+            let stops =
+                |order: &[usize]| order.iter().map(|&device| Stop { device, radius: FIRST_RADIUS }).collect();
+            initial_tours.push(stops(&order));
             order.reverse();
-            beginnings.push(stops(&order));
+            initial_tours.push(stops(&order));
         }
-        let found = beginnings.into_iter().map(|beginning| self.improve(start, devices, beginning));
+        let found = initial_tours.into_iter().map(|tour| self.improve(start, devices, tour));
         found.reduce(|a, b| if b.0 > a.0 { b } else { a }).map_or_else(Vec::new, |(_, tour)| tour)
     }
 
-    /// The best change at a time, until nothing improves; the tour and its utility.
+    /// Steepest ascent: applies the best change until no change improves the tour. Returns the utility and the tour.
     fn improve(&self, start: &Start<'_>, devices: &[Cell], mut tour: Vec<Stop>) -> (f32, Vec<Stop>) {
         let mut best = self.fly(start, devices, &tour).0;
         loop {
             let mut improved = None;
             for candidate in changes(&tour, &start.remaining) {
                 let value = self.fly(start, devices, &candidate).0;
-                if value > best + 1e-3 {
+                if value > best + GAIN_MIN {
                     best = value;
                     improved = Some(candidate);
                 }
@@ -221,14 +226,14 @@ impl Course {
         }
     }
 
-    /// Flies a tour in the mean; its utility `w . (percent, -energy)` and its first action.
+    /// The utility `w . (percent, -energy)` of a tour's mean flight, and its first action.
     fn fly(&self, start: &Start<'_>, devices: &[Cell], tour: &[Stop]) -> (f32, Option<Action>) {
         let mut flight = MeanFlight::begin(start);
         self.finish(&mut flight, start.guard, devices, tour);
         (self.utility(start, &flight), flight.first)
     }
 
-    /// The stops as far as the battery lasts, then home.
+    /// Flies the stops as far as the battery allows, then to the terminal.
     fn finish(&self, flight: &mut MeanFlight, guard: &Guard, devices: &[Cell], tour: &[Stop]) {
         let distance = |cell: Cell| guard.distance(cell).map_or(f32::INFINITY, f32::from);
         let affordable = |flight: &MeanFlight, action: Action| {
@@ -239,21 +244,21 @@ impl Course {
         'tour: for &Stop { device, radius } in tour {
             while flight.remaining[device] > EMPTY_UNITS {
                 let is_near =
-                    flight.cell.manhattan(devices[device]) <= radius && self.hears(flight.cell, device);
+                    flight.cell.manhattan(devices[device]) <= radius && self.is_fast(flight.cell, device);
                 let approach = approach(flight.cell, devices[device]).filter(|_| !is_near);
                 let action = approach.unwrap_or(Action::Hover);
                 if !affordable(flight, action) {
                     break 'tour;
                 }
                 self.slot(flight, action);
-                // Passing over the terminal would end the mission.
+                // A move into the terminal ends the mission.
                 if flight.cell == guard.terminal() && action != Action::Hover {
                     break 'tour;
                 }
             }
         }
         if flight.cell == guard.terminal() && !flight.moved {
-            // Hovering on a terminal that it started from ends nothing: out and back.
+            // Only a move into the terminal ends the mission, so the aircraft leaves it and returns.
             let out = Action::MOVES.into_iter().find(|&out| distance(flight.cell.after(out)) == 1.0);
             if let Some(out) = out {
                 self.slot(flight, out);
@@ -266,7 +271,6 @@ impl Course {
 
     fn utility(&self, start: &Start<'_>, flight: &MeanFlight) -> f32 {
         let percent = 100.0 * flight.collected / self.initial_units;
-        // Data alone would make every tour that empties the battery alike; thrift finds the better ones.
         let w_data = start.preference.w_data().min(W_DATA_MAX);
         w_data * percent - (1.0 - w_data) * flight.energy
     }
@@ -280,11 +284,12 @@ impl Course {
         flight.first = flight.first.or(Some(action));
     }
 
-    fn hears(&self, cell: Cell, device: usize) -> bool {
+    /// Whether the expected rate suffices for a stop.
+    fn is_fast(&self, cell: Cell, device: usize) -> bool {
         self.grid.index(cell).is_some_and(|place| self.links[device][place].1 > NEAR_UNITS)
     }
 
-    /// One slot in the mean: the device that is heard best among those with data sends.
+    /// One slot of a mean flight: of the devices with data, the one with the highest mean SNR sends.
     fn serve(&self, cell: Cell, remaining: &mut [f32]) -> f32 {
         let Some(place) = self.grid.index(cell) else { return 0.0 };
         let mut served: Option<(usize, f32, f32)> = None;
@@ -302,7 +307,7 @@ impl Course {
     }
 }
 
-/// Tours that differ from this one in one thing.
+/// The neighbourhood of a tour: one stop inserted, removed or moved, another radius, or a part reversed.
 fn changes(tour: &[Stop], remaining: &[f32]) -> Vec<Vec<Stop>> {
     let mut changed = Vec::new();
     let mut change = |edit: &dyn Fn(&mut Vec<Stop>)| {
@@ -314,7 +319,7 @@ fn changes(tour: &[Stop], remaining: &[f32]) -> Vec<Vec<Stop>> {
         match tour.iter().position(|stop| stop.device == device) {
             None => {
                 for place in 0..=tour.len() {
-                    change(&|other| other.insert(place, Stop { device, radius: 2 }));
+                    change(&|other| other.insert(place, Stop { device, radius: FIRST_RADIUS }));
                 }
             }
             Some(place) => {
@@ -341,7 +346,7 @@ fn changes(tour: &[Stop], remaining: &[f32]) -> Vec<Vec<Stop>> {
     changed
 }
 
-/// Towards the terminal along the longer axis where the fence allows it.
+/// The next move to the terminal, along the longer axis where the fence allows it.
 fn homeward(guard: &Guard, cell: Cell) -> Option<Action> {
     let here = guard.distance(cell)?;
     let shortens = |action: &Action| guard.distance(cell.after(*action)).is_some_and(|there| there < here);

@@ -12,8 +12,7 @@ const BOTTOM: f64 = 46.0;
 /// Half the size of a mark.
 const MARK: f64 = 4.6;
 
-/// How a series looks: the class that carries its colour, and the shape of its marks, so that nobody needs to tell
-/// colours apart.
+/// Appearance of a series: the class of its colour, and the shape of its marks, which identifies it without colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Look {
     pub class: &'static str,
@@ -34,12 +33,12 @@ pub(super) enum Shape {
     Star,
 }
 
-/// The oracle, the proven bound and the paper's numbers look the same everywhere.
+/// The oracle, the proven bound and the paper's numbers look the same in all charts.
 pub(super) const ORACLE: Look = Look { class: "oracle", shape: Shape::Ring };
 pub(super) const BOUND: Look = Look { class: "bound", shape: Shape::Bar };
 pub(super) const PAPER: Look = Look { class: "paper", shape: Shape::Star };
 
-/// The look of the system with this place in the report; GREEDY is the first.
+/// The style of the system at this index of the report; GREEDY is the first.
 pub(super) fn look(place: usize) -> Look {
     const LOOKS: [Look; 7] = [
         Look { class: "c0", shape: Shape::Square },
@@ -53,7 +52,7 @@ pub(super) fn look(place: usize) -> Look {
     if place == 0 { LOOKS[0] } else { LOOKS[1 + (place - 1) % (LOOKS.len() - 1)] }
 }
 
-/// One axis: what it shows, from where to where, and where it is labelled.
+/// One axis: title, range and labels.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     label: String,
@@ -63,7 +62,7 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Around these values, with round ticks. `fixed` ends are kept, whatever the values are.
+    /// An axis around these values with round ticks. Ends given in `fixed` are kept.
     pub fn around(label: &str, values: impl Iterator<Item = f64>, fixed: [Option<f64>; 2]) -> Axis {
         let (mut low, mut high) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
@@ -80,13 +79,13 @@ impl Axis {
         Axis { label: label.into(), from: low, to: high, ticks: ticks.collect() }
     }
 
-    /// One place for each name, at 0, 1, 2...
+    /// A category axis: the names at 0, 1, 2...
     pub fn of_names(label: &str, names: &[String]) -> Axis {
         let ticks = names.iter().enumerate().map(|(index, name)| (index as f64, name.clone()));
         Axis { label: label.into(), from: -0.55, to: names.len() as f64 - 0.45, ticks: ticks.collect() }
     }
 
-    /// The other way round: small values far from the origin.
+    /// Reversed: small values far from the origin.
     pub fn reversed(mut self) -> Axis {
         (self.from, self.to) = (self.to, self.from);
         self
@@ -103,7 +102,7 @@ fn round_step(least: f64) -> f64 {
     [1.0, 2.0, 5.0].map(|digit| digit * power).into_iter().find(|&step| step >= least).unwrap_or(10.0 * power)
 }
 
-/// With as many decimals as the step between two of them asks for, and thin spaces between thousands.
+/// A tick label with the decimals that the step needs and thin spaces between thousands.
 fn number(value: f64, step: f64) -> String {
     let decimals = (-step.log10().floor()).max(0.0) as usize;
     grouped(&format!("{:.decimals$}", if value == 0.0 { 0.0 } else { value }))
@@ -127,7 +126,7 @@ pub(super) fn grouped(number: &str) -> String {
     text
 }
 
-/// A point, how far it may be off, and what is said when a finger rests on it.
+/// A point, its error bar, and its tooltip.
 #[derive(Clone, Debug)]
 pub(super) struct Spot {
     pub x: f64,
@@ -136,17 +135,17 @@ pub(super) struct Spot {
     pub said: String,
 }
 
-/// What joins the points of a series.
+/// How the points of a series are joined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Joined {
     Not,
     Line,
     LineWithoutMarks,
-    /// Bars that stand on zero.
+    /// Bars from zero.
     Bars,
 }
 
-/// Points that belong together.
+/// The points of one system.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
     pub look: Look,
@@ -154,8 +153,8 @@ pub(super) struct Series {
     pub joined: Joined,
 }
 
-/// Draws the series over their axes. `highlight` is a range of x to be set off. `words` say what is shown to those who
-/// cannot see it.
+/// Draws the series and their axes. `highlight` is a range of x with another background. `words` is the text for screen
+/// readers.
 pub(super) fn plot(
     words: &str,
     x: &Axis,
@@ -212,7 +211,7 @@ fn drawn(series: &Series, at_x: &dyn Fn(f64) -> f64, at_y: &dyn Fn(f64) -> f64) 
     }
 }
 
-/// The mark as a path.
+/// The SVG path of a mark.
 fn outline(shape: Shape, x: f64, y: f64) -> String {
     let r = MARK;
     let polygon = |corners: &[(f64, f64)]| {
@@ -262,7 +261,7 @@ fn plus() -> [(f64, f64); 12] {
     ]
 }
 
-/// Names beside their marks.
+/// The legend: marks and names.
 pub(super) fn legend(entries: &[(String, Look)]) -> Markup {
     html! {
         ul.legend {
@@ -281,8 +280,7 @@ pub(super) fn legend(entries: &[(String, Look)]) -> Markup {
     }
 }
 
-/// A square matrix with names on both sides; the stronger a number, the stronger its cell. Names that are empty mark
-/// what is absent.
+/// A square matrix as a heat map with names on both sides. Rows and columns with an empty name are absent.
 pub(super) fn heat_map(words: &str, names: &[String], matrix: &[Vec<f32>], strongest: f32) -> Markup {
     let cell = 19.0;
     let (left, top) = (80.0, 78.0);

@@ -1,4 +1,4 @@
-//! The numbers behind the page, as CSV files.
+//! The numbers of the page as CSV files.
 
 use super::Report;
 use crate::judge::evaluation::{Missions, test_preferences};
@@ -8,10 +8,10 @@ use crate::judge::pareto::front;
 
 /// Name of the oracle in tables, legends and files.
 pub(super) const ORACLE: &str = "ORACLE";
-/// Columns that name what a line is about.
+/// Columns that identify a line.
 const ABOUT: &str = "system,scenario,devices,battery_units";
 
-/// Every file: name and content.
+/// All files: name and content.
 #[must_use]
 pub fn files(report: &Report) -> Vec<(&'static str, String)> {
     vec![
@@ -37,7 +37,7 @@ fn file(head: &str, lines: impl IntoIterator<Item = String>) -> String {
     text
 }
 
-/// Text as a field (RFC 4180): in quotation marks where it has to be.
+/// Text as a field (RFC 4180), quoted where necessary.
 fn field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -46,7 +46,7 @@ fn field(text: &str) -> String {
     }
 }
 
-/// Nothing for what was not measured.
+/// Empty for a number that was not measured.
 fn optional(number: Option<impl ToString>) -> String {
     number.map_or_else(String::new, |number| number.to_string())
 }
@@ -55,7 +55,7 @@ fn about(system: &str, setting: Setting) -> String {
     format!("{},{},{},{}", field(system), setting.scenario_name(), setting.devices, setting.battery)
 }
 
-/// Every system, the oracle last, in every setting that it was flown in.
+/// All systems in all settings that were flown; the oracle is last.
 fn flown(report: &Report) -> impl Iterator<Item = (String, Setting, &Missions)> {
     let systems = report.systems.iter().flat_map(|system| {
         let settings = Setting::ALL.into_iter().zip(&system.missions);

@@ -1,4 +1,4 @@
-//! The city from above with the way of a mission over it.
+//! The city from above with the path of a mission.
 
 use crate::judge::explanation::Track;
 use gleaner_units::HeightMap;
@@ -10,7 +10,7 @@ const CELL: f64 = 10.0;
 /// Classes of roofs, by height.
 const ROOFS: [(u8, u8); 4] = [(1, 12), (13, 25), (26, 38), (39, u8::MAX)];
 
-/// The roofs, once for the page: each mission refers to them.
+/// The roofs, once per page; each mission refers to them.
 pub(super) fn city(heights: &HeightMap) -> Markup {
     let grid = heights.grid();
     let roofs = |(low, high): (u8, u8)| -> String {
@@ -90,7 +90,7 @@ fn slice(x: f64, y: f64, r: f64, share: f64) -> String {
 
 fn view(heights: &HeightMap) -> String {
     let grid = heights.grid();
-    // A margin for the signs of devices at the edge.
+    // A margin for the symbols of devices at the edge.
     format!("-6 -6 {} {}", f64::from(grid.width()) * CELL + 12.0, f64::from(grid.height()) * CELL + 12.0)
 }
 

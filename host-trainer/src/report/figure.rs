@@ -1,4 +1,4 @@
-//! The figures: which numbers go on which axes.
+//! The figures.
 
 use super::chart::{Axis, BOUND, Joined, Look, ORACLE, PAPER, Series, Spot, heat_map, legend, look, plot};
 use super::table::Metric;
@@ -10,10 +10,10 @@ use crate::judge::pareto::front as best_of;
 use gleaner_world::ScenarioKind;
 use maud::{Markup, html};
 
-/// Number of devices that the paper's charts put side by side.
+/// Numbers of devices in the paper's charts.
 const PER_SCENARIO: usize = 5;
 
-/// The systems, the oracle if it was computed, and on request the bound and the paper.
+/// The systems, the oracle if it was computed, and if requested the bound and the paper.
 pub(super) fn systems_legend(report: &Report, with_references: bool) -> Markup {
     let mut entries: Vec<(String, Look)> =
         report.systems.iter().enumerate().map(|(place, system)| (system.name.clone(), look(place))).collect();
@@ -80,7 +80,7 @@ pub(super) fn generalization(report: &Report, kind: ScenarioKind, metric: Metric
             })
             .collect();
     let columns = report.systems.len() + 1;
-    // Side by side, so that equal values do not hide each other.
+    // Shifted, so that equal values do not cover each other.
     let aside = |column: usize| (column as f64 - 0.5 * (columns - 1) as f64) * (0.66 / columns as f64);
     let mut series = Vec::new();
     for (place, system) in report.systems.iter().enumerate() {
@@ -125,7 +125,7 @@ fn table_spot(name: &str, metric: Metric, table: &Table, x: f64) -> Spot {
     Spot { x, y, spread: metric.spread(table), said: format!("{name}: {}", metric.text(y)) }
 }
 
-/// Where the paper prints a number that can be drawn.
+/// The numbers that the paper prints.
 fn printed(settings: &[Setting], metric: Metric) -> Vec<Spot> {
     let text = |setting: &Setting| match metric {
         Metric::Coverage => setting.published().coverage,
@@ -140,7 +140,7 @@ fn printed(settings: &[Setting], metric: Metric) -> Vec<Spot> {
     settings.iter().enumerate().filter_map(of_one).collect()
 }
 
-/// A run looks as its system does in the other figures; one that is only a curve looks like none of them.
+/// The style of a run: that of its system, or one of its own if it is only a curve.
 fn curve_look(report: &Report, place: usize, name: &str) -> Look {
     let system = report.systems.iter().position(|system| system.name == name);
     look(system.unwrap_or(report.systems.len() + place))
@@ -174,7 +174,7 @@ pub(super) fn curves(report: &Report, kind: ScenarioKind) -> Markup {
                 ))
             });
             let spots: Vec<Spot> = told.collect();
-            // Marks tell runs apart while there are few of them.
+            // Marks are readable only for few runs.
             let joined = if spots.len() > 40 { Joined::LineWithoutMarks } else { Joined::Line };
             Series { look: curve_look(report, place, name), spots, joined }
         })
@@ -188,7 +188,7 @@ pub(super) fn curves(report: &Report, kind: ScenarioKind) -> Markup {
     plot(&format!("learning curves, {kind}"), &x, &y, &series, None)
 }
 
-/// One mission over the city.
+/// One mission in the city.
 pub(super) fn mission(report: &Report, name: &str, track: &Track) -> Markup {
     let words = format!(
         "{name} mission at w = {}: {:.0} percent of the data, {} battery units",

@@ -1,6 +1,6 @@
-//! The paper's tables and figures from our own measurements: what is shown, the CSV files and the page.
+//! The paper's tables and figures with our measurements, as a page and as CSV files.
 //!
-//! Measuring is not done here; [`Report`] holds what was measured, and everything here is a pure function of it.
+//! [`Report`] holds the measurements; this module measures nothing and is a pure function of it.
 
 mod attention;
 mod chart;
@@ -18,44 +18,44 @@ pub use crate::planner::oracle::OracleSetting;
 
 use crate::judge::evaluation::{Missions, Table};
 use crate::judge::explanation::{Gaze, Track};
-use crate::judge::paper::{Limits, Setting};
+use crate::judge::paper::{Bounds, Setting};
 use crate::judge::robustness::Repeats;
 use crate::keep::curves::Point;
 use gleaner_units::HeightMap;
 use gleaner_world::ScenarioKind;
 use serde::{Deserialize, Serialize};
 
-/// Everything that the report shows.
+/// The content of the report.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// The command that makes the report again.
+    /// The command that repeats the report.
     pub command: String,
-    /// What the inference times were measured on.
+    /// The machine of the inference times.
     pub machine: String,
     /// Evaluation realizations per setting.
     pub realizations: u64,
-    /// The city that was flown in.
+    /// The city of the missions.
     pub heights: HeightMap,
     /// Its fingerprint.
     pub city_hash: u64,
-    /// GREEDY first, then the learned systems in the order in which they were given.
+    /// GREEDY first, then the learned systems in the given order.
     pub systems: Vec<System>,
-    /// What the oracle reached and what the bound allows, by setting; missing settings were not computed.
+    /// Results of the oracle and the bound, by setting. Settings that were not computed are missing.
     pub oracle: Vec<OracleSetting>,
-    /// A closer look at the first learned system.
+    /// Details of the first learned system.
     pub detail: Option<Detail>,
-    /// Learning curves by the name of their run.
+    /// Learning curves, by the name of the run.
     pub curves: Vec<(String, Vec<Point>)>,
 }
 
 /// One system, flown in all settings.
 #[derive(Clone, Debug)]
 pub struct System {
-    /// How it is called in tables and legends.
+    /// Name in tables and legends.
     pub name: String,
-    /// What it was read from and what flew it.
+    /// Its file and the engine that ran it.
     pub origin: String,
-    /// Parameters of the policy that decides.
+    /// Parameters of the policy.
     pub parameters: Option<usize>,
     /// Time of one decision.
     pub latency: Option<Latency>,
@@ -79,12 +79,12 @@ pub struct Latency {
     pub median_us: f32,
     /// 99th percentile, microseconds.
     pub p99_us: f32,
-    /// How many decisions were timed.
+    /// Number of timed decisions.
     pub decisions: u32,
 }
 
 impl OracleSetting {
-    /// Whether it belongs to this setting.
+    /// Whether it is for this setting.
     #[must_use]
     pub fn is_of(&self, setting: Setting) -> bool {
         self.scenario == setting.kind.name()
@@ -92,16 +92,16 @@ impl OracleSetting {
             && self.battery == setting.battery
     }
 
-    /// The limits in the mean over the realizations that were bounded; `None` when none was.
+    /// The bound as a mean over the bounded realizations; `None` without any.
     #[must_use]
-    pub fn limits(&self, setting: Setting) -> Option<Limits> {
+    pub fn limits(&self, setting: Setting) -> Option<Bounds> {
         let bounds = &self.upper_bound_percent;
         let mean = bounds.iter().map(|bound| bound.min(100.0)).sum::<f32>() / bounds.len().max(1) as f32;
-        (!bounds.is_empty()).then(|| Limits { data_percent: mean, least_energy: setting.least_energy() })
+        (!bounds.is_empty()).then(|| Bounds { data_percent: mean, least_energy: setting.least_energy() })
     }
 }
 
-/// What is only measured of one system.
+/// Measurements of one system only.
 #[derive(Clone, Debug)]
 pub struct Detail {
     /// The system's name.
@@ -110,9 +110,9 @@ pub struct Detail {
     pub fading: Vec<(ScenarioKind, Repeats, Repeats)>,
     /// RD at w = (1, 0) and at w = (0, 1); empty for a system without attention.
     pub gazes: Vec<Gaze>,
-    /// The example's missions at w = 1, 0.5 and 0.
+    /// The missions of the example at w = 1, 0.5 and 0.
     pub tracks: Vec<(ScenarioKind, Vec<Track>)>,
-    /// Number of the evaluation realization that is the example.
+    /// Number of the example's evaluation realization.
     pub example: u64,
 }
 
@@ -124,21 +124,21 @@ impl Report {
         self.oracle.iter().rev().find(|oracle| oracle.is_of(setting))
     }
 
-    /// Whether anything was proven of what is possible.
+    /// Whether a bound was computed.
     #[must_use]
     pub fn is_bounded(&self) -> bool {
         self.oracle.iter().any(|oracle| !oracle.upper_bound_percent.is_empty())
     }
 
-    /// Whether the oracle flew the same realizations as the systems: means over others do not compare.
+    /// Whether the oracle has the same realizations as the systems. Means over others are not comparable.
     #[must_use]
     pub fn compares(&self, setting: Setting) -> bool {
         self.oracle(setting).is_some_and(|oracle| oracle.missions.realizations() as u64 == self.realizations)
     }
 
-    /// The proven limits in one setting; `None` unless exactly the realizations of the systems were bounded.
+    /// The bound in one setting; `None` unless it covers exactly the realizations of the systems.
     #[must_use]
-    pub fn limits(&self, setting: Setting) -> Option<Limits> {
+    pub fn limits(&self, setting: Setting) -> Option<Bounds> {
         let oracle = self.oracle(setting)?;
         let is_whole = oracle.upper_bound_percent.len() as u64 == self.realizations;
         is_whole.then(|| oracle.limits(setting)).flatten()

@@ -1,4 +1,4 @@
-//! The page: one HTML file that needs nothing else, readable on a desk, on a phone and on paper.
+//! The page: one HTML file without external resources, for large and small screens and for print.
 
 use super::attention::attention_section;
 use super::section::section;
@@ -116,14 +116,14 @@ fn main_section(report: &Report) -> Markup {
             @for kind in ScenarioKind::ALL { (main_table(report, kind)) }
             p {
                 "RD reaches a destination 32 cells away, RB returns to its base. Data is in percent of what all devices "
-                "hold, energy in battery units; a preference w = (data, energy) weighs the two. "
-                "Hypervolume is the area above (\u{2212}1, \u{2212}200) that the eleven preferences dominate: of the front of "
+                "hold, energy in battery units; the preference w = (data, energy) weights the two. "
+                "Hypervolume is the area above (\u{2212}1, \u{2212}200) that the eleven preferences dominate: for the front of "
                 "their means, and as the mean over single realizations. The oracle knows map, channel and devices; its "
-                "numbers are what the best tour that it found brings in the mean of the channel. It is a strong search, "
+                "numbers are expected values of the best tour that it found. It is a strong search, "
                 "not a proof."
                 @if report.is_bounded() {
-                    " Nobody can pass the proven bound, counted in the mean of the channel like the oracle: branch and bound "
-                    "gives that of the data, the shortest mission that of the energy, and the bounds of utility and hypervolume follow from those two, loosely."
+                    " No plan exceeds the proven bound in expectation. Branch and bound gives the bound of the data, and the "
+                    "shortest mission that of the energy. The bounds of utility and hypervolume follow from these two and are loose."
                 }
             }
         },
@@ -136,7 +136,7 @@ fn curves_section(report: &Report) -> Markup {
         "Learning curves (figure 4 a, c)",
         html! {
             @if report.curves.iter().all(|(_, points)| points.is_empty()) {
-                p { "No run was given: name its folder with " code { "--run" } " or " code { "--curve" } "." }
+                p { "No run was given: pass its folder with " code { "--run" } " or " code { "--curve" } "." }
             } @else {
                 figure {
                     (figure::curves_legend(report))
@@ -147,8 +147,8 @@ fn curves_section(report: &Report) -> Markup {
                     }
                     figcaption {
                         b { "Figure 4 a, c. " } "Hypervolume of the mean front on 60 validation realizations of the trained "
-                        "setting while learning. These realizations choose the parameters that are kept; all other numbers "
-                        "of this page come from others. The paper shows three seeds over environment steps and says that "
+                        "setting during training. The best parameters are selected on these realizations; all other numbers "
+                        "of this page are from other realizations. The paper shows three seeds over environment steps and says that "
                         "MOSAC-ATT leads after approximately 150\u{2009}000. From " code { "curves.csv" } "."
                     }
                 }
@@ -171,7 +171,7 @@ fn fronts_section(report: &Report) -> Markup {
                 }
                 figcaption {
                     b { "Figure 4 b, d. " } "One mark per preference, w = 0 to 1 in steps of 0.1: means over "
-                    (report.realizations) " realizations. The line joins those that no other dominates; up and right is "
+                    (report.realizations) " realizations. The line joins the non-dominated points; up and right is "
                     "better. The paper's fronts are a figure without printed numbers. From " code { "fronts.csv" } "."
                 }
             }
@@ -322,8 +322,8 @@ fn generalization_section(report: &Report) -> Markup {
                     }
                 }
                 figcaption {
-                    b { "Figure 6. " } "By number of devices K; B = 80, and B = 100 for K = 10. The trained setting is set "
-                    "off. Stars: numbers that the paper prints for MOSAC-ATT. Bars at the battery: standard deviation among realizations. From "
+                    b { "Figure 6. " } "By number of devices K; B = 80, and B = 100 for K = 10. The trained setting is "
+                    "highlighted. Stars: numbers that the paper prints for MOSAC-ATT. Error bars of the battery: standard deviation over the realizations. From "
                     code { "metrics.csv" } "."
                 }
             }

@@ -1,4 +1,4 @@
-//! The frame that every section of the page shares.
+//! The frame of a section of the page.
 
 use maud::{Markup, html};
 

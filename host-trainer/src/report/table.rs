@@ -1,16 +1,16 @@
-//! The tables: every one with the oracle and the bound beside the systems, and with words where there is no number.
+//! The tables: systems, oracle and bound, with a note in place of a missing number.
 
 use super::Report;
 use super::chart::grouped;
 use super::csv::ORACLE;
 use crate::judge::evaluation::Table;
-use crate::judge::paper::{Limits, Setting};
+use crate::judge::paper::{Bounds, Setting};
 use gleaner_world::ScenarioKind;
 use maud::{Markup, html};
 
-/// What the bound is called in tables and legends.
+/// Name of the bound in tables and legends.
 pub(super) const BOUND: &str = "proven bound";
-/// What the paper's numbers are called.
+/// Name of the paper's numbers.
 pub(super) const PAPER: &str = "paper";
 const NOT_COMPUTED: &str = "not computed";
 
@@ -43,7 +43,7 @@ impl Metric {
         }
     }
 
-    /// As a heading.
+    /// The heading.
     pub const fn title(self) -> &'static str {
         match self {
             Metric::Coverage => "Data at w = (1, 0)",
@@ -73,20 +73,20 @@ impl Metric {
         }
     }
 
-    /// How far single realizations are from the mean, where the paper gives it.
+    /// Standard deviation over the realizations, for metrics where the paper gives it.
     pub fn spread(self, table: &Table) -> f64 {
         if self == Metric::LeastEnergy { f64::from(table.least_energy_std()) } else { 0.0 }
     }
 
-    /// The limit that no system can pass. For energy it is known without any computation.
-    pub fn limit(self, setting: Setting, limits: Option<Limits>) -> Option<f64> {
+    /// The bound. That of energy needs no computation.
+    pub fn limit(self, setting: Setting, limits: Option<Bounds>) -> Option<f64> {
         match self {
             Metric::Coverage => limits.map(|limits| f64::from(limits.data_percent)),
             Metric::LeastEnergy => Some(f64::from(setting.least_energy())),
             Metric::Utility => limits.map(|limits| f64::from(limits.utility())),
-            Metric::Hypervolume => limits.map(Limits::hypervolume),
-            // The mean of rectangles with one side fixed is the rectangle of the mean.
-            Metric::MeanHypervolume => limits.map(Limits::hypervolume),
+            Metric::Hypervolume => limits.map(Bounds::hypervolume),
+            // With one side fixed, the mean area is the area of the mean side.
+            Metric::MeanHypervolume => limits.map(Bounds::hypervolume),
         }
     }
 
@@ -111,7 +111,7 @@ impl Metric {
     }
 }
 
-/// A number, its deviation, and how much of the oracle's it is.
+/// A number, its deviation, and its share of the oracle's number.
 fn cell(metric: Metric, table: &Table, oracle: Option<&Table>, is_best: bool) -> Markup {
     let value = metric.of(table);
     html! {
@@ -133,11 +133,11 @@ fn missing() -> Markup {
     html! { td.missing { (NOT_COMPUTED) } }
 }
 
-fn limit_cell(metric: Metric, setting: Setting, limits: Option<Limits>) -> Markup {
+fn limit_cell(metric: Metric, setting: Setting, limits: Option<Bounds>) -> Markup {
     metric.limit(setting, limits).map_or_else(missing, |limit| html! { td { (metric.text(limit)) } })
 }
 
-/// Systems in rows, metrics in columns: one scenario in the setting that is trained in.
+/// Systems in rows, metrics in columns: one scenario in the trained setting.
 pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
     let setting = Setting::trained(kind);
     let tables: Vec<Option<Table>> = report.systems.iter().map(|system| system.table(setting)).collect();
@@ -186,7 +186,7 @@ pub(super) fn main_table(report: &Report, kind: ScenarioKind) -> Markup {
             }
             } }
             figcaption {
-                "Mean over " (report.realizations) " realizations; ± is the standard deviation among them. Bold: the best "
+                "Mean over " (report.realizations) " realizations; ± is their standard deviation. Bold: the best "
                 "of the systems. From " code { "metrics.csv" } ". " (bounded(report, setting))
             }
         }
@@ -209,7 +209,7 @@ pub(super) fn metric_table(report: &Report, metric: Metric) -> Markup {
             tbody { @for setting in Setting::ALL { (metric_row(report, metric, setting)) } }
             } }
             figcaption {
-                "Mean over " (report.realizations) " realizations a row; the trained setting is set off. From "
+                "Mean over " (report.realizations) " realizations per row; the trained setting is highlighted. From "
                 code { "metrics.csv" } "."
             }
         }
@@ -248,7 +248,7 @@ fn best_of<'a>(metric: Metric, tables: impl Iterator<Item = &'a Table>) -> Optio
     tables.map(|table| metric.of(table)).reduce(|a, b| if metric.is_better(b, a) { b } else { a })
 }
 
-/// How much of the bound was computed, in words.
+/// A note on the computed part of the bound.
 fn bounded(report: &Report, setting: Setting) -> String {
     match report.oracle(setting) {
         None => format!("{ORACLE} was not computed for this report."),

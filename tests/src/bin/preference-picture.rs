@@ -16,13 +16,13 @@ const CAPTION_HEIGHT: f32 = 58.0;
 const MAP_FILL: &str = "#f6f4ef";
 
 /// One flight: its picture and what it achieved.
-struct Flight {
+struct FlownMission {
     w_data: &'static str,
     picture: String,
     report: Value,
 }
 
-fn fly(w_data: &'static str) -> Result<Flight> {
+fn fly(w_data: &'static str) -> Result<FlownMission> {
     let folder = tempfile::tempdir()?;
     let output = Command::new(programs::path("gleaner-sitl"))
         .current_dir(programs::repository())
@@ -31,7 +31,7 @@ fn fly(w_data: &'static str) -> Result<Flight> {
         .output()?;
     ensure!(output.status.success(), "gleaner-sitl fly: {}", String::from_utf8_lossy(&output.stderr));
     let picture = fs::read_to_string(folder.path().join("trajectory.svg"))?;
-    Ok(Flight { w_data, picture, report: serde_json::from_slice(&output.stdout)? })
+    Ok(FlownMission { w_data, picture, report: serde_json::from_slice(&output.stdout)? })
 }
 
 /// The number in an attribute of an element.
@@ -53,8 +53,8 @@ fn map(picture: &str) -> Result<[f32; 4]> {
     ])
 }
 
-fn panel(flight: &Flight, left: f32) -> Result<(String, f32)> {
-    let Flight { w_data, picture, report } = flight;
+fn panel(flight: &FlownMission, left: f32) -> Result<(String, f32)> {
+    let FlownMission { w_data, picture, report } = flight;
     let [x, y, width, height] = map(picture)?;
     let content = picture.split_once("<svg").and_then(|(_, rest)| rest.split_once('>'));
     let (_, content) = content.context("an SVG picture")?;

@@ -112,7 +112,7 @@ impl Outgoing {
     /// Withdraws the setpoint and the commands that move the aircraft, as far as they have not left.
     pub fn revoke(&mut self) {
         self.setpoint = None;
-        // Once around, without them: `Deque::retain` may panic as far as a linker can tell.
+        // Not `Deque::retain`, which leaves a panic path in the image: each packet is taken out once and the others put back.
         for _ in 0..self.urgent.len() {
             if let Some(packet) = self.urgent.pop_front().filter(|packet| !moves_the_aircraft(packet)) {
                 let _ = self.urgent.push_back(packet);

@@ -154,7 +154,10 @@ fn every_stream_is_requested_until_it_arrives() {
     }
     assert!(!streams.iter().any(|&(id, _)| id == 65.0), "no RC channel is mapped");
     assert!(asked.iter().any(|ask| (ask.0, ask.1) == (512, 49.0)), "the origin is asked for");
-    assert!(!streams.iter().any(|&(id, _)| id == 230.0), "PX4's estimator report is not asked of ArduPilot");
+    assert!(
+        !streams.iter().any(|&(id, _)| id == 230.0),
+        "PX4's estimator report is not requested from ArduPilot"
+    );
     // None came: asked for again. One comes: asked for no more.
     let mut positions = 0;
     for second in 0..20 {

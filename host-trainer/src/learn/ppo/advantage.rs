@@ -57,15 +57,15 @@ pub(super) fn targets(
             shaped_return: advantage + experience.value,
             loss_of_ending,
         });
-        // The advantage of a prompt is no credit to the policy's earlier actions.
+        // The policy's earlier actions get no credit for a prompt.
         (next_value, next_advantage) =
             (experience.value, if experience.is_prompted { 0.0 } else { advantage });
     }
     targets
 }
 
-/// Divides the advantages by their standard deviation among samples of similar preference. Otherwise the variance of the
-/// collected data would hide half a battery unit at w = (0, 1).
+/// Divides the advantages by their standard deviation among samples of similar preference. With one deviation for all, half
+/// a battery unit at w = (0, 1) would be small against the variance of the data.
 pub(super) fn normalise(targets: &mut [Target], constants: &PpoSettings) {
     let bins = constants.preference_bins;
     let mut sums = vec![(0.0, 0.0); bins];

@@ -8,11 +8,12 @@
 //!   (potential-based shaping: Ng, Harada and Russell 1999). See `advantage`.
 //! - **Advantage.** A critic with the policy's observation learns the expected sum of the shaped rewards; advantages are
 //!   generalised estimates (Schulman et al. 2016), normalised by preference.
-//! - **Unlikelihood.** A policy gradient vanishes where the policy is certain. Policies therefore kept ending missions by
-//!   flying over the terminal. A move that ends a mission at a loss is made less likely directly. See `loss`.
-//! - **Prompts.** For the same reason a certain policy does not explore another device order. The planner sometimes flies
-//!   for some slots, and the policy imitates them if they went better than the critic expected. See `prompt`.
-//! - **Views.** Every mission is observed in one of the eight views, turned or mirrored, so that no direction is special.
+//! - **Unlikelihood.** A policy gradient vanishes where the policy is certain. Without a remedy, policies kept the error of
+//!   flying over the terminal, which ends the mission. An additional loss lowers the probability of a move that ends a
+//!   mission too early. See `loss`.
+//! - **Prompts.** For the same reason a certain policy does not explore another device order. The planner sometimes selects
+//!   the actions of a few slots, and the policy imitates them if their advantage is large. See `prompt`.
+//! - **Views.** Each mission is observed in one of the eight views, rotated or mirrored, so that no direction is special.
 
 mod advantage;
 mod loss;
@@ -97,11 +98,11 @@ struct Stored {
 }
 
 impl Refinement {
-    /// Continues from the checkpoint in `folder`, or starts with the actor of `first`, its logits multiplied by
-    /// `confidence`: a student that spreads its probability over many actions flies better by the best of them.
+    /// Continues from the checkpoint in `folder`, or starts with the actor of `first`. Its logits are multiplied by
+    /// `confidence`: with the flat distribution of a student, samples would rarely be the best action.
     ///
-    /// With `others` it starts with the mean of all parameters. Runs with the same start stay close together, and their
-    /// mean is better than each of them (model soups: Wortsman et al. 2022).
+    /// With `others` it starts with the mean of all parameters. The parameters of runs with the same start stay close to each
+    /// other, and their mean performs better than each of them (model soups: Wortsman et al. 2022).
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
@@ -307,7 +308,7 @@ impl Trainer for Refinement {
         advantage::normalise(&mut targets, &self.constants);
         let losses = self.learn(&targets);
         self.stored.update += 1;
-        // A plain mean at first, so that the average soon forgets the initial parameters.
+        // A plain mean at first, so that the initial parameters soon have no weight.
         let share = self.constants.averaging.max(1.0 / self.stored.update as f32);
         net::polyak(&mut self.stored.averaged, &self.stored.actor, share);
         Ok(losses)

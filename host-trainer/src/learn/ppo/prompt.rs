@@ -1,8 +1,8 @@
 //! Prompts: slots in which the planner's action replaces the policy's.
 //!
-//! A change of the device order needs many equal moves, each of which the policy is sure not to make. It therefore never
-//! explores another order by itself. Where the policy is unlikely to try the planner's action and its own action loses
-//! utility by the planner's estimate, the planner sometimes flies for a few slots.
+//! Another device order takes many moves in the other direction. A certain policy gives each of them almost no
+//! probability, so it does not explore other orders. A prompt starts at random in a slot where the policy is unlikely to
+//! take the planner's action and its own action loses utility by the planner's estimate. It lasts a few slots.
 
 use crate::env::distribution::Distribution;
 use crate::learn::ppo::rollout::RolloutFlight;
