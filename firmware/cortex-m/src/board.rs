@@ -32,7 +32,7 @@ pub trait Board {
     fn feed_watchdog();
 }
 
-/// What a board hands over after it has brought itself up.
+/// The parts of a board after its start.
 pub struct Parts<B: Board> {
     /// Cause of the last reset.
     pub reset_flags: ResetFlags,

@@ -45,7 +45,7 @@ impl InputPin for Input {
     }
 }
 
-/// An output that remembers what was written and panics when the same level is written twice in a row.
+/// An output that records what is written and panics when the same level is written twice in a row.
 #[derive(Clone)]
 pub(crate) struct Output(Rc<(RefCell<Vec<PinState>>, Cell<bool>)>);
 

@@ -5,7 +5,7 @@ use embedded_hal::digital::{InputPin, OutputPin};
 use gleaner_pilot::State;
 use gleaner_units::Instant;
 
-/// What a person beside the aircraft sees and sets.
+/// The LED and the switch on the aircraft.
 pub struct Panel<L, I> {
     led: StatusLed<L>,
     inhibit: EngageInhibit<I>,

@@ -9,7 +9,7 @@ use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashError, NorFlashEr
 
 /// Sectors that the parameters have.
 const SECTORS: u32 = 2;
-/// Time between two looks at the busy flag.
+/// Time between two reads of the busy flag.
 const POLL_US: u32 = 10;
 
 /// The registers that erase and write a chip's flash, limited to the parameters' two sectors. Offsets count bytes from

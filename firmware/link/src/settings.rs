@@ -76,7 +76,7 @@ pub struct Status {
     pub may_return: bool,
 }
 
-/// Why the link refuses to engage, whatever the state of the owner.
+/// Why the link refuses to engage in every state of the owner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EngageBlock {
     /// Another component sends with our ids.

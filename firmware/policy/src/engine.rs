@@ -12,7 +12,7 @@ use std::str::FromStr;
 /// The engines of a host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EngineKind {
-    /// Runs the graph of the ONNX file, whatever its operators. Needs the feature `tract`.
+    /// Runs the graph of the ONNX file with any operators. Needs the feature `tract`.
     Tract,
     /// The default, because it is the fastest: the network of the microcontroller on the host's vector unit. Reads its own
     /// file, or converts the ONNX file.

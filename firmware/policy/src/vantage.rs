@@ -1,8 +1,8 @@
 //! The vantage of a device: the cell from which to collect its data.
 //!
-//! The position of a device says little about where it can be received: one tower beside it hides it from half of the
-//! city. The vantage is the nearest cell to the aircraft with line of sight to the device and a fast link, so its offset
-//! and its distance in moves are direct inputs for planning.
+//! The position of a device does not determine where it is received: one tower beside it blocks half of the city. The
+//! vantage is the nearest cell to the aircraft with line of sight to the device and a fast link. Its offset and its distance
+//! in moves are direct inputs for planning.
 
 use crate::yields::units_per_slot;
 use gleaner_units::{Cell, Sight};

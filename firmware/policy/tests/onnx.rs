@@ -170,7 +170,7 @@ fn every_number_reaches_its_place_and_the_card_is_read() {
 }
 
 #[test]
-fn tokens_that_break_the_contract_get_an_error_and_leave_no_trace() {
+fn invalid_tokens_give_an_error_and_leave_no_trace() {
     let mut policy = TractPolicy::load_checked(&FILE).unwrap();
     let answer = policy.infer(&tokens()).unwrap();
     let mut short = tokens();

@@ -5,10 +5,10 @@ use gleaner_world::Fading;
 use std::fmt;
 use std::str::FromStr;
 
-/// Differences between the world and the nominal one. The policy and its map features know nothing of them. The oracle,
-/// when it is run, knows the true world. GREEDY has no map and knows the true remaining data.
+/// Differences between the world and the nominal one. The policy and its map features use the nominal one. The oracle, when
+/// it is run, uses the true world. GREEDY uses no map, and the true remaining data.
 #[derive(Clone, Debug, Default, clap::Args)]
-#[command(next_help_heading = "Mismatch: the world differs from what the policy is told")]
+#[command(next_help_heading = "Mismatch: the world differs from the policy's model")]
 pub struct MismatchArguments {
     /// Noise above the nominal level, dB; may be negative.
     #[arg(long, value_name = "DB", allow_negative_numbers = true, default_value_t = 0.0)]

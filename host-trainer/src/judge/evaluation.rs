@@ -183,8 +183,8 @@ pub fn mean_and_std(numbers: impl Iterator<Item = f32> + Clone) -> (f32, f32) {
     (mean as f32, variance.sqrt() as f32)
 }
 
-/// What one system brought home in one setting: for each test preference by rising weight of data, the total of every
-/// realization in order.
+/// Results of one system in one setting: for each test preference by rising weight of data, the total of each realization
+/// in order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Missions(pub Vec<Vec<Reward>>);
 

@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn shares_add_to_one_and_devices_are_one_kind() {
         let mut attention = Attention::NONE;
-        // Two queries: one looks at the preference, one at two devices.
+        // Two queries: one attends to the preference, one to two devices.
         attention.0[0][1] = 1.0;
         attention.0[3][3] = 0.5;
         attention.0[3][4] = 0.5;

@@ -140,7 +140,7 @@ fn a_state_under_many_preferences_is_what_it_is_under_each() {
 }
 
 #[test]
-fn tensors_tile_the_flat_vector_and_counts_are_the_documented_ones() {
+fn tensors_fill_the_flat_vector_with_documented_counts() {
     fn check<N: Architecture>(outputs: usize, count: usize) {
         let network = N::with_outputs(outputs);
         let mut next = 0;

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_have_the_variance_of_their_link_and_fading_the_mean_of_its_law() {
+    fn draws_have_the_documented_mean_and_variance() {
         let mut rng = Seed::training(3).rng(Stream::Slots);
         let mut statistics = |channel: Channel, line_of_sight: bool| {
             let draws: Vec<f64> = (0..100_000)

@@ -77,7 +77,7 @@ const TRACE: [(Option<usize>, f32); 12] = [
 ];
 
 #[test]
-fn data_flows_at_the_pose_before_the_move_and_only_a_move_into_the_terminal_ends() {
+fn data_is_sent_before_the_move_and_only_a_move_ends() {
     let world = world();
     let mut episode = single(&world, 5000.0);
     let heard = episode.devices()[0].snr;
@@ -102,7 +102,7 @@ fn data_flows_at_the_pose_before_the_move_and_only_a_move_into_the_terminal_ends
 }
 
 #[test]
-fn a_slot_takes_at_most_what_is_left_and_an_empty_device_is_not_served() {
+fn a_slot_is_limited_by_remaining_data() {
     let mut episode = single(&world(), 1000.0);
     let first = episode.step(Action::Hover).unwrap();
     assert!(first.collected_units > 500.0);

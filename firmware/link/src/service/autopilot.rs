@@ -346,9 +346,9 @@ fn fresh<T: Copy>(latest: Latest<T>, now: Instant, max_age: Duration) -> Option<
     latest.filter(|(_, at)| now.since(*at) <= max_age).map(|(value, _)| value)
 }
 
-/// Whether a heartbeat is a vehicle's flight controller. Judged by what it says of itself, not by its component id:
-/// it names an autopilot (`MAV_AUTOPILOT` other than 8, none), and its `MAV_TYPE` is a vehicle. Everything else is a
-/// peripheral or a ground station: gimbals, cameras, companions, antenna trackers and types that we do not know.
+/// Whether a heartbeat is that of a vehicle's flight controller: it has an autopilot (`MAV_AUTOPILOT` other than 8, none),
+/// and its `MAV_TYPE` is a vehicle. The component id does not matter. All others, with unknown types, count as peripherals
+/// or ground stations: gimbals, cameras, companions, antenna trackers.
 pub(crate) fn is_autopilot(heartbeat: &Heartbeat) -> bool {
     const NO_AUTOPILOT: u8 = 8;
     heartbeat.autopilot != NO_AUTOPILOT

@@ -162,15 +162,15 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    /// A resend that says so (`confirmation` above 0) arrives within this time of the first.
+    /// Longest time between the first transmission and a marked resend (`confirmation` above 0).
     const CONFIRMED: Duration = Duration::from_secs(10);
-    /// The same command with nothing else from its sender in between: ground stations retry after 3 s.
+    /// The same for an unmarked resend without another command of its sender in between: ground stations retry after 3 s.
     const REPEATED: Duration = Duration::from_millis(3_500);
 
     /// The answer already given if `command` is a resend.
     ///
-    /// Only the newest command of a sender can be resent: off, engage, off are three requests, even if the last says
-    /// that it was sent before. Off and return are never resends: to act twice on them does no harm.
+    /// Only the newest command of a sender can be a resend: off, engage, off are three requests, even if the last is marked
+    /// as a resend. Off and return are never resends, because acting twice on them does no harm.
     pub fn of_resend(&self, now: Instant, command: &Command) -> Option<CommandResult> {
         if is_always_run(command) {
             return None;

@@ -94,8 +94,8 @@ fn judge_v2(held: &[u8]) -> Candidate {
     header.verify(held, HEADER_V2, usize::from(length))
 }
 
-/// Payload length of the MAVLink 1 messages that we need. A MAVLink 1 header has an id of eight bits and no flags,
-/// so noise looks like one easily: only these are accepted, and only with their exact length.
+/// Payload length of the MAVLink 1 messages that are needed. Noise often resembles a MAVLink 1 header, which has an id of
+/// eight bits and no flags. Therefore only these messages are accepted, and only with their exact length.
 const fn length_v1(message_id: u8) -> Option<u8> {
     Some(match message_id {
         0 => 9,

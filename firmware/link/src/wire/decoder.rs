@@ -27,14 +27,14 @@ pub struct DecodeStats {
 /// Finds frames in a stream of bytes.
 ///
 /// # A payload is data
-/// A frame that is not understood may carry recorded frames in its payload: a log download, a tunnel, a message
-/// newer than the dialect. The decoder never reads them as frames of their own as long as the stream is in order:
-/// - Directly behind a frame, or at the start of a datagram, the length of a MAVLink 2 header with an unknown id is
-///   believed, and the frame is skipped as a whole.
-/// - Any other rejected header is skipped as a whole if another frame begins where it says that it ends.
-///   Otherwise the search goes on at its second byte.
+/// The payload of an unknown frame may contain recorded frames: a log download, a tunnel, a message newer than the
+/// dialect. In an undamaged stream the decoder never returns them:
+/// - Directly after a frame, or at the start of a datagram, a MAVLink 2 frame with an unknown id is skipped by the length
+///   in its header.
+/// - Any other rejected header is skipped by its length if another frame begins there. Otherwise the search continues at
+///   its second byte.
 ///
-/// So noise on a line costs at most the frames that begin within twice [`MAX_FRAME_BYTES`] bytes behind it.
+/// Noise on a line therefore costs at most the frames that begin within twice [`MAX_FRAME_BYTES`] bytes after it.
 ///
 /// # Cost
 /// Linear in the bytes for clean input. Garbage made of magic bytes costs one checksum per magic byte.

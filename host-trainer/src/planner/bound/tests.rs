@@ -7,6 +7,11 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 const SIDE: usize = 3;
+/// Nodes of the bounds. On the small missions below they lower the mean gap from 13.5 % of the data (one node) to 5.4 %.
+const NODES: u32 = 200;
+/// Limit of the mean gap between bound and optimum, as a share of the data: the measured 5.4 % and a margin. Branching that
+/// has stopped working gives 13.5 %.
+const GAP_MAX: f64 = 0.07;
 
 /// Nine cells, two devices, each received over about half of the cells, and a battery for at most ten slots.
 fn small(rng: &mut ChaCha8Rng) -> Mission {
@@ -58,24 +63,25 @@ fn optimum(mission: &Mission, cell: usize, half_units: i32, data: &[f64]) -> Opt
 #[test]
 fn bound_is_above_the_optimum_and_close_to_it() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
-    let (mut gap, mut cases) = (0.0, 0);
+    let (mut gaps, mut cases) = ([0.0; 2], 0);
     for _ in 0..60 {
         let mission = small(&mut rng);
         let Some(best) = optimum(&mission, mission.start, (2.0 * mission.battery) as i32, &mission.data)
         else {
-            assert_eq!(mission.bound(0.0, 200), 0.0, "the terminal is out of reach");
+            assert_eq!(mission.bound(0.0, NODES), 0.0, "the terminal is out of reach");
             continue;
         };
-        let [few, many] = [1, 200].map(|nodes| mission.bound(0.0, nodes));
+        let [few, many] = [1, NODES].map(|nodes| mission.bound(0.0, nodes));
         assert!(many >= best - 1e-6, "bound {many} is below the optimum {best}");
         assert!(many <= few, "more nodes raised the bound from {few} to {many}");
-        gap += (many - best) / mission.data.iter().sum::<f64>();
+        let all: f64 = mission.data.iter().sum();
+        gaps = [gaps[0] + (few - best) / all, gaps[1] + (many - best) / all];
         cases += 1;
     }
     assert!(cases > 40, "only {cases} missions can reach their terminal");
-    // The 57 cases of this seed have a mean gap of 0.0?; a looser bound is a regression.
-    let gap = gap / f64::from(cases);
-    assert!(gap < 0.07, "mean gap between bound and optimum: {gap:.4} of the data");
+    let [at_root, gap] = gaps.map(|gap| gap / f64::from(cases));
+    println!("mean gap {gap:.4} of the data with {NODES} nodes, {at_root:.4} with one");
+    assert!(gap < GAP_MAX, "mean gap between bound and optimum: {gap:.4} of the data");
 }
 
 #[test]
@@ -90,7 +96,7 @@ fn bound_is_above_the_oracle_and_below_all_data() {
             let problem = Problem { model: &known, state: &state, w_data: 1.0 };
             let effort = Effort { tours: 2_000, temperatures: [5.0, 0.03] };
             let (reached, _) = problem.anneal(Tour::default(), effort, &mut ChaCha8Rng::seed_from_u64(0));
-            let bound = upper_bound_percent(&rates, realization, reached, 200);
+            let bound = upper_bound_percent(&rates, realization, reached, NODES);
             assert!(bound >= reached - 1e-3, "bound {bound} % is below the plan's {reached} %");
             bound
         })
