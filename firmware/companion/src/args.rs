@@ -2,9 +2,11 @@
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
+use gleaner_dashboard::http_address;
 use gleaner_policy::EngineKind;
 use gleaner_policy::native::WeightFormat;
 use gleaner_ports::Endpoint;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -43,8 +45,54 @@ pub enum Command {
     Ports,
     /// Replay a decision log of `gleaner` or `gleaner-sitl` and list the decisions that change.
     Replay(Replay),
+    /// Write a finished flight as a web page in one file.
+    Report(Report),
+    /// Show a mission.
+    #[command(subcommand)]
+    Mission(MissionCommand),
     /// Make an ONNX model of your own flyable: check it, add golden pairs, seal it.
     Seal(Sealing),
+}
+
+/// A flight to show.
+#[derive(Args)]
+pub struct Report {
+    /// The folder of decisions.jsonl and flight.tlog, or a decisions.jsonl. Its last run is shown.
+    #[arg(value_name = "FLIGHT")]
+    pub flight: PathBuf,
+    /// The mission that was flown.
+    #[arg(long, value_name = "FILE")]
+    pub mission: PathBuf,
+    /// The page to write.
+    #[arg(long, value_name = "FILE", default_value = "flight.html")]
+    pub html: PathBuf,
+    /// The configuration of the run, for GLN_ALT, GLN_RESERVE and the component id; without it the default values.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// The trained policy that flew, for its attention [default: the built-in one].
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+}
+
+/// What to do with a mission.
+#[derive(Subcommand)]
+pub enum MissionCommand {
+    /// Print the mission: city, fence, battery, and from how many cells each device is in line of sight.
+    Show(MissionShow),
+}
+
+/// A mission to show.
+#[derive(Args)]
+pub struct MissionShow {
+    /// The mission file.
+    #[arg(value_name = "FILE")]
+    pub mission: PathBuf,
+    /// Also draw it, as a web page in one file: city, fence, terminal, devices and line of sight.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Flight altitude for line of sight, metres.
+    #[arg(long, value_name = "METRES", default_value_t = 60, value_parser = clap::value_parser!(u16).range(20..=120))]
+    pub altitude: u16,
 }
 
 /// A model to seal.
@@ -144,6 +192,9 @@ pub struct Setup {
     /// Folder for decisions.jsonl and flight.tlog.
     #[arg(long = "log", value_name = "FOLDER")]
     pub log_dir: Option<PathBuf>,
+    /// Serve the live page at this address: a port of this computer, or ADDRESS:PORT. Other computers need a token.
+    #[arg(long, value_name = "ADDRESS", value_parser = http_address)]
+    pub http: Option<SocketAddr>,
     /// Folder for what outlives a run: parameters set from a ground station, and how the last run ended.
     #[arg(long = "state", value_name = "FOLDER")]
     pub state_dir: Option<PathBuf>,

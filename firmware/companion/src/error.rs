@@ -123,6 +123,15 @@ pub enum StartError {
         /// What.
         source: PortError,
     },
+    /// The page cannot be served.
+    #[error(transparent)]
+    Page(#[from] gleaner_dashboard::ServerError),
+    /// The page would command as an operator that is not allowed.
+    #[error("the page commands as {operator}, which `operators` leaves out: add \"{operator}\" there, or remove `http`")]
+    PageOperator {
+        /// `SYSTEM/COMPONENT`.
+        operator: String,
+    },
     /// Interrupts cannot be caught.
     #[error("cannot catch interrupts: {0}: start the program where signals are not blocked")]
     Signals(io::Error),

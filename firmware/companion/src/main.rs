@@ -16,9 +16,11 @@ mod error;
 mod keep;
 mod load;
 mod logs;
+mod mission;
 mod params;
 mod ports;
 mod replay;
+mod report;
 mod routing;
 mod run;
 mod seal;
@@ -41,6 +43,8 @@ fn main() -> ExitCode {
         Ok(Command::Params { config }) => params::params(config.as_deref()),
         Ok(Command::Ports) => Ok(ports::ports()),
         Ok(Command::Replay(order)) => replay::replay(&order),
+        Ok(Command::Report(order)) => report::report(&order),
+        Ok(Command::Mission(order)) => mission::mission(&order),
         Ok(Command::Seal(order)) => seal::run(&order),
         Err(answered) => return answered,
     };

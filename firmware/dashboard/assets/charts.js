@@ -36,14 +36,14 @@ const Charts = {
     return drawing;
   },
 
-  whatIf(flight) {
-    const box = byId("what-if-box");
-    box.hidden = !flight.whatIf;
-    if (!flight.whatIf) return;
+  whatIf(flight, t) {
+    const whatIf = flight.whatIfAt(t);
+    byId("what-if-box").hidden = !whatIf;
+    if (!whatIf) return;
     const { grid, devices, terminal } = flight.scene;
-    const live = flight.liveAt(flight.end);
+    const live = flight.liveAt(t);
     const up = (y) => grid.height - y;
-    byId("what-if").replaceChildren(...flight.whatIf.options.map((option) => {
+    byId("what-if").replaceChildren(...whatIf.options.map((option) => {
       const now = live && Math.abs(live.w_data - option.w) < 1e-6;
       const drawing = shape("svg", { viewBox: `0 0 ${grid.width} ${grid.height}`, role: "img",
         "aria-label": `Predicted path at a preference of ${option.w}` },

@@ -7,7 +7,7 @@ class Flight {
     this.live = data.live || [];
     this.decisions = data.decisions || [];
     this.texts = data.texts || [];
-    this.whatIf = data.what_if || null;
+    this.whatIf = data.what_if || [];
   }
 
   get end() {
@@ -21,14 +21,16 @@ class Flight {
   // One event of the stream. A point of the track that lies within a second of the last kept one replaces it, so that
   // a long flight stays small.
   add(kind, value) {
-    if (kind === "live") {
-      const points = this.live;
-      const previous = points[points.length - 2];
-      if (previous && value.t_s - previous.t_s < 1) points[points.length - 1] = value;
-      else points.push(value);
-    } else if (kind === "decision") this.decisions.push(value);
+    if (kind === "live") Flight.thin(this.live, value, 1);
+    else if (kind === "decision") this.decisions.push(value);
     else if (kind === "text") this.texts.push(value);
-    else if (kind === "what_if") this.whatIf = value;
+    else if (kind === "what_if") Flight.thin(this.whatIf, value, 10);
+  }
+
+  static thin(list, value, interval_s) {
+    const previous = list[list.length - 2];
+    if (previous && value.t_s - previous.t_s < interval_s) list[list.length - 1] = value;
+    else list.push(value);
   }
 
   // The last entry of a list at or before a time; the first one before that.
@@ -43,6 +45,10 @@ class Flight {
 
   liveAt(t) {
     return Flight.at(this.live, t) || this.live[0] || null;
+  }
+
+  whatIfAt(t) {
+    return Flight.at(this.whatIf, t);
   }
 
   decisionAt(t) {

@@ -9,6 +9,10 @@ const Page = {
     const { scene } = this.flight;
     byId("title").textContent = scene.title;
     document.title = `Gleaner: ${scene.title}`;
+    document.body.classList.toggle("plan", !scene.controls && this.flight.live.length === 0);
+    byId("sight").replaceChildren(element("option", { value: "" }, "no device"),
+      ...scene.devices.map((device, index) => element("option", { value: index }, `device ${device.id}`)));
+    byId("sight-box").hidden = scene.sight.length === 0;
     MapView.city(scene);
     Controls.build(scene);
     this.refresh();
@@ -45,7 +49,7 @@ const Page = {
     Panels.attention(flight.scene, decision);
     Panels.texts(flight, t);
     Charts.draw(flight, t);
-    Charts.whatIf(flight);
+    Charts.whatIf(flight, t);
     Controls.reflect(live);
   },
 
@@ -70,11 +74,12 @@ const Page = {
       MapView.city(this.flight.scene);
       this.refresh();
     };
+    byId("sight").addEventListener("change", repaint);
     addEventListener("resize", repaint);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
     const embedded = Source.embedded();
     if (embedded) {
-      this.link("good", "finished flight");
+      this.link("good", embedded.live.length ? "finished flight" : "mission");
       byId("follow").textContent = "End";
       this.show(embedded);
       return;

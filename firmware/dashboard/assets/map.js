@@ -28,6 +28,7 @@ const MapView = {
       context.fillRect(x * scale, (height - 1 - y) * scale, scale, scale);
     });
     if (scene.fence) this.fence(context, scene, scale);
+    this.sight(context, scene, scale);
     byId("legend").textContent =
       `Buildings up to ${tallest} m: the darker or brighter, the taller. Cells of ${scene.grid.cell_m} m, ` +
       `grid north ${scene.grid.rotation_deg ? `${scene.grid.rotation_deg}° clockwise of true north` : "up"}. ` +
@@ -49,6 +50,29 @@ const MapView = {
     });
   },
 
+  // The cells from which the chosen device is in line of sight.
+  sight(context, scene, scale) {
+    const cells = scene.sight[Number(byId("sight").value)];
+    if (byId("sight").value === "" || !cells) return;
+    const { width, height } = scene.grid;
+    context.fillStyle = colour("--sight");
+    [...cells].forEach((seen, index) => {
+      if (seen === "1") {
+        context.fillRect((index % width) * scale, (height - 1 - Math.floor(index / width)) * scale, scale, scale);
+      }
+    });
+  },
+
+  // An arrow to true north, which is not up where the grid is rotated.
+  compass({ grid }) {
+    const [x, y] = [grid.width - 1.6, 1.8];
+    const turn = `rotate(${-grid.rotation_deg} ${x} ${y})`;
+    return [
+      shape("path", { class: "north", d: `M${x} ${y - 1.2} l.55 2 l-.55 -.4 l-.55 .4 z`, transform: turn }),
+      shape("text", { x, y: y + 1.5, "text-anchor": "middle" }, "N"),
+    ];
+  },
+
   // Everything that depends on the moment.
   draw(flight, t) {
     const { scene } = flight;
@@ -63,14 +87,15 @@ const MapView = {
     if (points.length > 1) {
       parts.push(shape("polyline", { class: "track", points: points.map((p) => `${p.x},${up(p.y)}`).join(" ") }));
     }
-    const chosen = flight.whatIf && live && flight.whatIf.options.find((option) => option.w === live.w_data);
-    if (chosen && t >= flight.end) parts.push(this.path(chosen.path, up, "ahead"));
+    const whatIf = flight.whatIfAt(t);
+    const chosen = whatIf && live && whatIf.options.find((option) => Math.abs(option.w - live.w_data) < 0.126);
+    if (chosen && t - whatIf.t_s < 20) parts.push(this.path(chosen.path, up, "ahead"));
     if (live && live.x !== null && decision) parts.push(...this.attention(scene, live, decision, up));
     scene.devices.forEach((device, index) => parts.push(...this.device(device, live && live.devices[index], up)));
     if (live && live.x !== null) {
       parts.push(shape("circle", { class: "aircraft", cx: live.x, cy: up(live.y), r: 0.55 }));
     }
-    overlay.replaceChildren(...parts);
+    overlay.replaceChildren(...parts, ...this.compass(scene));
     byId("map-words").textContent = this.words(scene, live, decision);
   },
 

@@ -94,6 +94,19 @@ pub(crate) struct Rights {
 }
 
 impl Access {
+    /// The rule for an address: the loopback one where other computers cannot reach it and no tokens are given, else
+    /// tokens, random ones where none are given.
+    ///
+    /// # Errors
+    /// [`AccessError::Random`].
+    pub fn of(address: SocketAddr, tokens: Option<[Token; 2]>) -> Result<Access, AccessError> {
+        match tokens {
+            None if address.ip().is_loopback() => Ok(Access::Loopback),
+            None => Ok(Access::Tokens { view: Token::random()?, control: Token::random()? }),
+            Some([view, control]) => Ok(Access::Tokens { view, control }),
+        }
+    }
+
     /// Whether a server may listen at `address` under this rule.
     ///
     /// # Errors

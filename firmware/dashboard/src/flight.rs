@@ -13,6 +13,8 @@ const LIVE_MAX: usize = 4_000;
 const ENTRIES_MAX: usize = 10_000;
 /// Shortest time between two kept points of the track, s.
 const LIVE_INTERVAL_S: f64 = 1.0;
+/// Shortest time between two kept predictions, s.
+const WHAT_IF_INTERVAL_S: f64 = 10.0;
 
 /// What is fixed before the flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +27,10 @@ pub struct Scene {
     pub heights_m: Vec<u8>,
     /// Whether each cell may be flown over, in the order of `heights_m`; `None` where all may.
     pub fence: Option<Vec<bool>>,
+    /// For each device the cells with line of sight to it at `altitude_m`: `1` or `0`, in the order of `heights_m`.
+    pub sight: Vec<String>,
+    /// Flight altitude above the ground, m.
+    pub altitude_m: u16,
     /// The cell that ends the mission.
     pub terminal: [i16; 2],
     /// The devices, in the mission's order.
@@ -147,6 +153,8 @@ pub struct Text {
 /// The flight from here at several preferences, predicted with the on-board model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WhatIf {
+    /// Since the start of the program, s.
+    pub t_s: f64,
     /// One for each preference, in rising order of the weight of data.
     pub options: Vec<WhatIfOption>,
 }
@@ -156,7 +164,7 @@ pub struct WhatIf {
 pub struct WhatIfOption {
     /// Weight of data.
     pub w: f32,
-    /// The cells from here to the terminal.
+    /// From here to the terminal: straight lines between these cells.
     pub path: Vec<[i16; 2]>,
     /// Expected fraction of the initial data at the end.
     pub collected: f32,
@@ -205,15 +213,15 @@ pub struct Flight {
     pub decisions: Vec<Decision>,
     /// The messages, in order of time.
     pub texts: Vec<Text>,
-    /// The newest predictions.
-    pub what_if: Option<WhatIf>,
+    /// The predictions, in order of time.
+    pub what_if: Vec<WhatIf>,
 }
 
 impl Flight {
     /// A flight before its first event.
     #[must_use]
     pub const fn new(scene: Scene) -> Flight {
-        Flight { scene, live: Vec::new(), decisions: Vec::new(), texts: Vec::new(), what_if: None }
+        Flight { scene, live: Vec::new(), decisions: Vec::new(), texts: Vec::new(), what_if: Vec::new() }
     }
 
     /// Adds an event. The track keeps one point a second, and the newest.
@@ -222,7 +230,18 @@ impl Flight {
             Event::Live(live) => self.add_live(live),
             Event::Decision(decision) => push_bounded(&mut self.decisions, decision),
             Event::Text(text) => push_bounded(&mut self.texts, text),
-            Event::WhatIf(what_if) => self.what_if = Some(what_if),
+            Event::WhatIf(what_if) => self.add_what_if(what_if),
+        }
+    }
+
+    /// Keeps one prediction in ten seconds, and the newest.
+    fn add_what_if(&mut self, what_if: WhatIf) {
+        let before = self.what_if.len().checked_sub(2).map(|index| self.what_if[index].t_s);
+        match self.what_if.last_mut() {
+            Some(newest) if before.is_some_and(|before| what_if.t_s - before < WHAT_IF_INTERVAL_S) => {
+                *newest = what_if;
+            }
+            _ => push_bounded(&mut self.what_if, what_if),
         }
     }
 

@@ -38,6 +38,11 @@ impl GroundClient {
         GroundClient { own, pilot, sequence: 0, next_heartbeat: now, pending: None }
     }
 
+    /// The pilot's address, once it is known.
+    pub const fn set_pilot(&mut self, pilot: Address) {
+        self.pilot = pilot;
+    }
+
     /// Whether a command waits for its acknowledgement: the next order must wait, too.
     #[must_use]
     pub const fn is_busy(&self) -> bool {

@@ -54,6 +54,8 @@ mod tests {
             grid,
             heights_m: vec![0, 12],
             fence: None,
+            sight: Vec::new(),
+            altitude_m: 60,
             terminal: [0, 0],
             devices: Vec::new(),
             battery_units: 80.0,

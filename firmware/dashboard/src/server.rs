@@ -66,6 +66,7 @@ pub enum ServerError {
 #[derive(Debug)]
 pub struct Server {
     address: SocketAddr,
+    access: Access,
     events: mpsc::Sender<Event>,
     orders: mpsc::Receiver<Order>,
     dropped: u64,
@@ -82,6 +83,31 @@ struct Shared {
 
 /// An encoded event, ready for every viewer.
 type Message = (&'static str, Arc<str>);
+
+/// Publishes events from another thread. No call of it waits.
+#[derive(Clone, Debug)]
+pub(crate) struct Publisher {
+    events: mpsc::Sender<Event>,
+}
+
+/// The address of `--http`: a port of this computer only, or ADDRESS:PORT.
+///
+/// # Errors
+/// The text is neither; the message says how to write it.
+pub fn http_address(text: &str) -> Result<SocketAddr, String> {
+    let (host, port) = text.rsplit_once(':').unwrap_or(("127.0.0.1", text));
+    let host = if host == "localhost" { "127.0.0.1" } else { host };
+    format!("{host}:{port}").parse().map_err(|_| {
+        format!("{text:?} is no address of a page: write a port, as in 8080, or ADDRESS:PORT, as in 0.0.0.0:8080")
+    })
+}
+
+impl Publisher {
+    /// An event that finds the channel full is dropped.
+    pub fn publish(&self, event: Event) {
+        let _ = self.events.try_send(event);
+    }
+}
 
 impl Server {
     /// Listens at `address` and serves the page. Port 0 takes a free one: see [`Server::address`].
@@ -100,7 +126,7 @@ impl Server {
             flight: Mutex::new(Flight::new(scene)),
             stream: broadcast::channel(VIEWER_LAG).0,
             orders,
-            access,
+            access: access.clone(),
             viewers: Arc::new(Semaphore::new(VIEWERS)),
             next_command: Mutex::new(Instant::now()),
         });
@@ -113,7 +139,7 @@ impl Server {
             .name("dashboard".into())
             .spawn(move || runtime.block_on(serve(listener, received, shared)))
             .map_err(ServerError::Start)?;
-        Ok(Server { address, events, orders: taken, dropped: 0 })
+        Ok(Server { address, access, events, orders: taken, dropped: 0 })
     }
 
     /// Where the page is.
@@ -129,6 +155,29 @@ impl Server {
         }
     }
 
+    /// Publishes from another thread. The server ends when the handle and all publishers are dropped.
+    pub(crate) fn publisher(&self) -> Publisher {
+        Publisher { events: self.events.clone() }
+    }
+
+    /// The addresses to open, each with the right that it gives.
+    #[must_use]
+    pub fn links(&self) -> Vec<(&'static str, String)> {
+        let host = match self.address.ip().is_unspecified() {
+            true => "THIS-COMPUTER".to_owned(),
+            false if self.address.is_ipv6() => format!("[{}]", self.address.ip()),
+            false => self.address.ip().to_string(),
+        };
+        let page = format!("http://{host}:{}/", self.address.port());
+        match &self.access {
+            Access::Loopback => vec![("page", page)],
+            Access::Tokens { view, control } => vec![
+                ("page to view", format!("{page}#token={}", view.secret())),
+                ("page to control", format!("{page}#token={}", control.secret())),
+            ],
+        }
+    }
+
     /// The next order of a viewer.
     pub fn order(&mut self) -> Option<Order> {
         self.orders.try_recv().ok()
@@ -141,7 +190,7 @@ impl Server {
     }
 }
 
-/// Runs until the handle is dropped.
+/// Runs until the handle and the publishers are dropped.
 async fn serve(listener: TcpListener, mut events: mpsc::Receiver<Event>, shared: Arc<Shared>) {
     // Only fails outside a runtime.
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
@@ -270,5 +319,25 @@ async fn command(State(shared): State<Arc<Shared>>, Json(command): Json<Command>
     match answered.await {
         Ok(words) => Json(serde_json::json!({ "words": words })).into_response(),
         Err(_) => (StatusCode::SERVICE_UNAVAILABLE, "the program has stopped").into_response(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_a_port_or_an_address_with_a_port() {
+        for (text, address) in [
+            ("8080", "127.0.0.1:8080"),
+            ("localhost:80", "127.0.0.1:80"),
+            ("0.0.0.0:8080", "0.0.0.0:8080"),
+            ("[::1]:9", "[::1]:9"),
+        ] {
+            assert_eq!(http_address(text), Ok(address.parse().unwrap()));
+        }
+        for wrong in ["", "drone", "127.0.0.1", "127.0.0.1:70000", "http://127.0.0.1:80"] {
+            assert!(http_address(wrong).unwrap_err().contains("write a port"), "{wrong}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! States and reasons in plain words.
 
 use gleaner_link::{Firmware, FlightMode};
-use gleaner_pilot::{Machine, State, Vehicle};
+use gleaner_pilot::{Machine, State};
 
 /// Who has the aircraft.
 pub(crate) const fn owner(state: State, armed: bool) -> &'static str {
@@ -30,8 +30,8 @@ pub(crate) fn reason(machine: &Machine) -> String {
 }
 
 /// The autopilot's mode by its own name.
-pub(crate) const fn mode(vehicle: &Vehicle) -> &'static str {
-    match (vehicle.mode, vehicle.firmware) {
+pub(crate) const fn mode(mode: Option<FlightMode>, firmware: Option<Firmware>) -> &'static str {
+    match (mode, firmware) {
         (None, _) => "not heard",
         (Some(FlightMode::Guided), Some(Firmware::Px4)) => "OFFBOARD",
         (Some(FlightMode::Guided), _) => "GUIDED",

@@ -11,6 +11,8 @@ fn scene() -> Scene {
         grid: Grid { width: 2, height: 1, cell_m: 20.0, rotation_deg: 0.0 },
         heights_m: vec![0, 12],
         fence: None,
+        sight: Vec::new(),
+        altitude_m: 60,
         terminal: [0, 0],
         devices: Vec::new(),
         battery_units: 80.0,

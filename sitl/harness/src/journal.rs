@@ -44,9 +44,25 @@ impl Slot {
         };
         Some(Tokens::build(&situation, self.heard.iter().copied()))
     }
-}
 
-impl Slot {
+    /// The line of a decision log for this slot, with the model's input built again; `None` if the record's preference is
+    /// impossible.
+    #[must_use]
+    pub fn logged(&self, setup: &MissionSetup) -> Option<LoggedDecision> {
+        let (tokens, slots) = self.observation(&setup.mission)?;
+        Some(LoggedDecision {
+            time_us: self.at.as_micros(),
+            position_ned_m: Some([self.position.north_m, self.position.east_m, self.position.down_m]),
+            lookahead: self.lookahead(setup),
+            truth: Some(SimulatedSlot {
+                served: self.serving.map(|serving| serving.device),
+                served_units: self.serving.map_or(0.0, |serving| serving.collected_units),
+                collected_after: self.collected,
+            }),
+            ..LoggedDecision::from_record(LOG_EPOCH_S, &self.record, tokens, slots)
+        })
+    }
+
     /// The look-ahead's part of the log.
     fn lookahead(&self, setup: &MissionSetup) -> Option<LoggedLookAhead> {
         let settings = (Metres(setup.altitude_m()), setup.plan.reserve);
@@ -131,19 +147,7 @@ impl Journal {
     /// # Errors
     /// Those of the writer.
     pub fn write_decisions(&self, setup: &MissionSetup, out: &mut impl Write) -> io::Result<()> {
-        for slot in &self.slots {
-            let Some((tokens, slots)) = slot.observation(&setup.mission) else { continue };
-            let line = LoggedDecision {
-                time_us: slot.at.as_micros(),
-                position_ned_m: Some([slot.position.north_m, slot.position.east_m, slot.position.down_m]),
-                lookahead: slot.lookahead(setup),
-                truth: Some(SimulatedSlot {
-                    served: slot.serving.map(|serving| serving.device),
-                    served_units: slot.serving.map_or(0.0, |serving| serving.collected_units),
-                    collected_after: slot.collected,
-                }),
-                ..LoggedDecision::from_record(LOG_EPOCH_S, &slot.record, tokens, slots)
-            };
+        for line in self.slots.iter().filter_map(|slot| slot.logged(setup)) {
             serde_json::to_writer(&mut *out, &line)?;
             out.write_all(b"\n")?;
         }

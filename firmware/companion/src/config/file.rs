@@ -2,6 +2,7 @@
 
 use super::{ConfigError, RadioFormat, SigningConfig};
 use crate::logs::Limits;
+use gleaner_dashboard::{Token, http_address};
 use gleaner_link::{Operators, Parameters};
 use gleaner_pilot::Settings;
 use gleaner_policy::EngineKind;
@@ -10,6 +11,7 @@ use gleaner_radio::Calibration;
 use gleaner_units::Db;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -35,6 +37,8 @@ pub(super) struct File {
     #[serde(default)]
     pub log: LogTable,
     #[serde(default)]
+    pub page: PageTable,
+    #[serde(default)]
     pub parameters: BTreeMap<String, Spanned<f64>>,
 }
 
@@ -50,6 +54,14 @@ impl Default for LogTable {
     fn default() -> LogTable {
         LogTable { telemetry: true, file_mb: None, min_free_mb: None }
     }
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PageTable {
+    http: Option<Spanned<String>>,
+    view_token: Option<Spanned<String>>,
+    control_token: Option<Spanned<String>>,
 }
 
 /// `offset_db + slope * measured`, in place of the format's own calibration.
@@ -159,6 +171,33 @@ impl Source<'_> {
             ports.push("ground".to_owned());
         }
         Ok(Some(SigningConfig { key: folder.join(&table.key), ports }))
+    }
+
+    pub fn http(&self, page: &PageTable) -> Result<Option<SocketAddr>, ConfigError> {
+        let Some(text) = &page.http else { return Ok(None) };
+        let address = http_address(text.get_ref());
+        address.map(Some).map_err(|error| self.fault(text.span().start, format!("page.http: {error}")))
+    }
+
+    pub fn page_tokens(&self, page: &PageTable) -> Result<Option<[Token; 2]>, ConfigError> {
+        let token = |key, text: &Spanned<String>| {
+            Token::new(text.get_ref())
+                .map_err(|error| self.fault(text.span().start, format!("page.{key}: {error}")))
+        };
+        match (&page.view_token, &page.control_token) {
+            (None, None) => Ok(None),
+            (Some(view), Some(control)) if view.get_ref() == control.get_ref() => Err(self.fault(
+                control.span().start,
+                "page.control_token: it equals view_token: viewers would have control".into(),
+            )),
+            (Some(view), Some(control)) => {
+                Ok(Some([token("view_token", view)?, token("control_token", control)?]))
+            }
+            (Some(one), None) | (None, Some(one)) => Err(self.fault(
+                one.span().start,
+                "page: give view_token and control_token, or neither".into(),
+            )),
+        }
     }
 
     pub fn limits(&self, table: &LogTable) -> Result<Limits, ConfigError> {

@@ -18,6 +18,11 @@
 //! key = "signing.key"                         # 64 hexadecimal digits or a passphrase, mode 600
 //! ports = ["ground"]                          # or "autopilot"
 //!
+//! [page]                                      # optional
+//! http = "127.0.0.1:8080"                     # the live page: a port, or ADDRESS:PORT
+//! view_token = "..."                          # for other computers: at least 16 letters, digits, '-' or '_'
+//! control_token = "..."                       # without tokens random ones are printed at the start
+//!
 //! [log]                                       # optional
 //! telemetry = true                            # flight.tlog beside decisions.jsonl
 //! file_mb = 64                                # a longer file is renamed; eight old ones are kept
@@ -33,11 +38,13 @@ use crate::args::Setup;
 use crate::logs::Limits;
 use crate::text::{self, TextFault};
 use file::Source;
+use gleaner_dashboard::Token;
 use gleaner_link::{ParameterId, Parameters};
 use gleaner_pilot::Settings;
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
 use gleaner_radio::Calibration;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
@@ -83,6 +90,10 @@ pub struct Config {
     pub parameters: Parameters,
     /// Message signing, where a port needs it.
     pub signing: Option<SigningConfig>,
+    /// Where the live page is served.
+    pub http: Option<SocketAddr>,
+    /// The tokens to view and to control the page; without them random ones, or none on a loopback address.
+    pub page_tokens: Option<[Token; 2]>,
 }
 
 /// Message signing.
@@ -164,6 +175,17 @@ pub fn parameters(path: &Path) -> Result<Parameters, ConfigError> {
     source.parameters(&source.parse()?.parameters)
 }
 
+/// The ids and the parameters that the file at `path` sets, the others at their defaults.
+///
+/// # Errors
+/// As [`parameters`].
+pub fn identity(path: &Path) -> Result<(Settings, Parameters), ConfigError> {
+    let text = read(path)?;
+    let source = Source { path, text: &text };
+    let file = source.parse()?;
+    Ok((source.settings(&file)?, source.parameters(&file.parameters)?))
+}
+
 fn read(path: &Path) -> Result<String, ConfigError> {
     let bytes = fs::read(path).map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
     text::decode(bytes).map_err(|source| ConfigError::Text { path: path.to_owned(), source })
@@ -192,6 +214,8 @@ fn merge(
         log_limits: source.limits(&file.log)?,
         telemetry_log: file.log.telemetry,
         signing: source.signing(&file, folder)?,
+        http: setup.http.or(source.http(&file.page)?),
+        page_tokens: source.page_tokens(&file.page)?,
         model: path(&setup.model, &file.model),
         engine: setup.engine.or(engine),
         mission: path(&setup.mission, &file.mission).ok_or(missing("mission", "mission.toml"))?,

@@ -4,6 +4,7 @@
 //! leave only after a poll: when this loop stops, both stop, and the autopilot's own failsafes act.
 
 use super::console::Console;
+use super::page::Page;
 use super::radio::RadioDecoder;
 use super::service::Service;
 use super::{Kept, Logs, unix_time_s};
@@ -41,6 +42,7 @@ pub struct Flight {
     logs: Logs,
     kept: Option<Kept>,
     console: Console,
+    page: Page,
     service: Service,
     polled_at: Instant,
     traffic_at: Instant,
@@ -55,7 +57,7 @@ impl Flight {
         (radio, radio_decoder): (Option<Port>, RadioDecoder),
         logs: Logs,
         kept: Option<Kept>,
-        console: Console,
+        (console, page): (Console, Page),
         service: Service,
     ) -> Flight {
         let now = Instant::now();
@@ -68,6 +70,7 @@ impl Flight {
             logs,
             kept,
             console,
+            page,
             service,
             polled_at: now,
             traffic_at: now,
@@ -136,6 +139,7 @@ impl Flight {
     fn tick(&mut self, now: Instant) {
         self.maintain(now);
         self.report_logs();
+        self.take_page_commands(now);
         self.onboard.poll(clock::at(now));
         self.polled_at = now;
         self.service.feed(now);
@@ -146,16 +150,27 @@ impl Flight {
         }
         let position = self.onboard.link().autopilot().position(clock::at(now), MAX_POSITION_AGE);
         let lookahead = self.onboard.logged_lookahead(clock::at(now));
-        if let Some(decision) = self.onboard.decision() {
-            self.console.decision(decision);
+        if let Some(decision) = self.onboard.decision().cloned() {
+            self.console.decision(&decision);
             if let Some(log) = &mut self.logs.decisions {
-                log.write(decision, took, position.map(|report| report.position), lookahead);
+                log.write(&decision, took, position.map(|report| report.position), lookahead);
             }
+            self.page.decided(clock::at(now), &decision, &self.onboard);
         }
         if self.console.state(self.onboard.state()) {
             self.service.status(self.onboard.state().name());
         }
         self.keep(now);
+    }
+
+    /// The page commands as a ground station does, and its frames stand in the log like those of one.
+    fn take_page_commands(&mut self, now: Instant) {
+        for frame in self.page.poll(now, &self.onboard) {
+            self.onboard.receive_link(clock::at(now), &frame);
+            if let Some(log) = &mut self.logs.telemetry {
+                log.write(&frame);
+            }
+        }
     }
 
     /// After a take-over nothing of ours that moves the aircraft may leave, not even from the queues of the ports.
@@ -227,7 +242,7 @@ impl Flight {
     }
 
     fn send(&mut self) {
-        let Flight { onboard, links, logs, console, .. } = self;
+        let Flight { onboard, links, logs, console, page, .. } = self;
         let now = Instant::now();
         let mut frame = [0; MAX_FRAME_BYTES];
         loop {
@@ -235,6 +250,7 @@ impl Flight {
             if bytes == 0 {
                 return;
             }
+            page.sent(&frame[..bytes]);
             links.send(now, &frame[..bytes], |packet| {
                 console.sent(packet);
                 if let Some(log) = &mut logs.telemetry {

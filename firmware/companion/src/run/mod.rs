@@ -2,6 +2,7 @@
 
 mod console;
 mod flight;
+mod page;
 mod radio;
 mod service;
 
@@ -19,6 +20,7 @@ use gleaner_link::Parameters;
 use gleaner_pilot::{Budget, LookingAhead, Onboard};
 use gleaner_policy::Timed;
 use gleaner_ports::{Endpoint, Peers, Port};
+use page::Page;
 use radio::RadioDecoder;
 use service::Service;
 use std::process::ExitCode;
@@ -36,6 +38,7 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let engine = load::model(config.model.as_deref(), config.engine)?;
     let model = format!("{}, engine {engine}", engine.name());
     let (kept, parameters, lines) = Kept::open(&config, order.reset_parameters)?;
+    let page = Page::open(&config, &mission, &parameters, &model)?;
     // The engine reproduced its golden pairs, or it would not have been loaded.
     let policy = LookingAhead::new(Timed::new(engine, clock::now), Budget::LINUX);
     let onboard = Onboard::new(mission, parameters, config.settings, policy, Ok(()))
@@ -46,6 +49,9 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let stop = gleaner_ports::end_requested().map_err(StartError::Signals)?;
     let console = Console::start(order.verbose);
     introduce(&config, &order.setup, &model, &links, radio.as_ref());
+    for line in page.introduction(config.page_tokens.is_some()) {
+        tracing::info!("{line}");
+    }
     for line in &lines {
         tracing::info!("{line}");
     }
@@ -58,7 +64,7 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
         (radio, RadioDecoder::new(config.radio_format)),
         logs,
         kept,
-        console,
+        (console, page),
         Service::new(),
     );
     flight.fly(|| stop.load(Ordering::Relaxed));

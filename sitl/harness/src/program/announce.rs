@@ -7,11 +7,13 @@ use gleaner_ports::{Endpoint, Port};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Prints one line per endpoint, with the port number that the system chose for port 0, and the mission file.
+/// Prints one line per endpoint, with the port number that the system chose for port 0, then the mission file and the
+/// addresses of the page.
 pub(super) fn ports(
     roles: &[(&str, Option<&Port>)],
     onboard: Option<&str>,
     mission: Option<&Path>,
+    page: &[(&'static str, String)],
 ) -> Result<(), ProgramError> {
     let mut out = io::stdout().lock();
     let mut say = |line: String| writeln!(out, "{line}").map_err(ProgramError::Stdout);
@@ -25,6 +27,9 @@ pub(super) fn ports(
     }
     if let Some(path) = mission {
         say(format!("mission {}", path.display()))?;
+    }
+    for (right, address) in page {
+        say(format!("{right} {address}"))?;
     }
     out.flush().map_err(ProgramError::Stdout)
 }

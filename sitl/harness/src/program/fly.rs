@@ -3,7 +3,7 @@
 use super::announce::{ports, write_mission};
 use super::arguments::{BoardOrder, FlyOrder};
 use super::results::PolicyInfo;
-use super::{ProgramError, load, model, results};
+use super::{ProgramError, load, model, page, results};
 use crate::{
     Ending, Figures, FlightError, FlightResult, FlightRun, FlightScript, MissionSetup, Wired, fly_wired,
 };
@@ -35,6 +35,11 @@ pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
     };
     let figures = flown.figures();
     let picture = results::write_files(&order.out, &flown.simulation, &figures, &policy_info.model)?;
+    if let Some(path) = &order.html {
+        // A board flies its own copy of the model; decisions of another model stay unexplained.
+        let policy = model::load(order.model.as_deref(), order.engine)?;
+        page::write(path, &flown.simulation, page::title(&flown.simulation, &policy_info), policy)?;
+    }
     let wall_s = begun.elapsed().as_secs_f64();
     if order.json {
         println!("{}", results::json(&figures, &policy_info, wall_s));
@@ -57,7 +62,7 @@ fn fly_board(
     let open = |endpoint: &Endpoint| Port::open(endpoint).map_err(ProgramError::Port);
     let mut wired = Wired::new(open(&board.autopilot)?, board.radio.as_ref().map(open).transpose()?);
     let roles = [("autopilot", Some(wired.autopilot())), ("radio", wired.radio())];
-    ports(&roles, None, order.mission_out.as_deref())?;
+    ports(&roles, None, order.mission_out.as_deref(), &[])?;
     let begun = Instant::now();
     while !wired.await_peer(Duration::from_millis(100)).map_err(ProgramError::Wait)? {
         if begun.elapsed() > CONNECT_LIMIT {

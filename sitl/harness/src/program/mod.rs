@@ -6,6 +6,7 @@ mod city;
 mod fly;
 mod load;
 mod model;
+mod page;
 mod radio;
 mod results;
 mod serve;
@@ -66,6 +67,9 @@ pub enum ProgramError {
     /// A port cannot be opened.
     #[error("{0}")]
     Port(gleaner_ports::PortError),
+    /// The page cannot be served.
+    #[error("{0}")]
+    Page(#[from] gleaner_dashboard::ServerError),
     /// The system delivers no interrupt.
     #[error("cannot listen for an interrupt: {0}: run it in the foreground of a terminal")]
     Signals(io::Error),

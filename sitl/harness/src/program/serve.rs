@@ -3,6 +3,7 @@
 use super::ProgramError;
 use super::announce::{ports, write_mission};
 use super::arguments::ServeOrder;
+use super::page::Page;
 use super::results::PolicyInfo;
 use super::{load, model, results};
 use crate::companion::parameters;
@@ -59,6 +60,14 @@ impl Pilot {
         };
         Ok(Pilot::Outside(Wired::new(open(companion)?, order.radio.as_ref().map(open).transpose()?)))
     }
+
+    /// The model and the engine, as far as they are known here.
+    fn info(&self) -> PolicyInfo {
+        match self {
+            Pilot::Inside(_, policy_info) => policy_info.clone(),
+            Pilot::Outside(_) => PolicyInfo::outside("companion"),
+        }
+    }
 }
 
 /// The simulation with everything that is plugged into it.
@@ -66,6 +75,7 @@ struct Server {
     simulation: Simulation,
     pilot: Pilot,
     ground: Port,
+    page: Option<Page>,
     /// Arms and takes off with `--auto-takeoff`.
     operator: Option<Operator>,
     now: Instant,
@@ -90,7 +100,8 @@ impl Server {
         let ground = Port::open(&order.ground).map_err(ProgramError::Port)?;
         let simulation =
             Simulation::new(setup, Settings::default().component_id).map_err(FlightError::from)?;
-        Ok(Server { simulation, pilot, ground, operator, now: Instant::ZERO })
+        let page = order.http.map(|address| Page::open(address, order, &simulation, &pilot.info()));
+        Ok(Server { page: page.transpose()?, simulation, pilot, ground, operator, now: Instant::ZERO })
     }
 
     fn introduce(&self, order: &ServeOrder) -> Result<(), ProgramError> {
@@ -103,7 +114,8 @@ impl Server {
             ("radio", wired.and_then(Wired::radio)),
             ("gcs", Some(&self.ground)),
         ];
-        ports(&roles, onboard, order.mission_out.as_deref())?;
+        let page = self.page.as_ref().map_or(Vec::new(), Page::links);
+        ports(&roles, onboard, order.mission_out.as_deref(), &page)?;
         for line in self.next_steps(order) {
             println!("{line}");
         }
@@ -194,6 +206,15 @@ impl Server {
         }
         for frame in simulation.to_ground() {
             self.ground.send(&frame);
+            if let Some(page) = &mut self.page {
+                page.heard(&frame);
+            }
+        }
+        if let Some(page) = &mut self.page {
+            match &mut self.pilot {
+                Pilot::Inside(onboard, _) => page.show_pilot(simulation, self.now, onboard),
+                Pilot::Outside(_) => page.show_wire(simulation, self.now),
+            }
         }
         let asked = self.operator.as_mut().map_or(Vec::new(), |operator| operator.poll(self.now));
         for frame in simulation.crew(&asked) {
@@ -227,10 +248,7 @@ impl Server {
         let Some(first) = slots.first() else { return Ok(!finished) };
         let switches = slots.windows(2).filter(|pair| pair[0].record.w_data != pair[1].record.w_data).count();
         let figures = Figures::of(&self.simulation, first.record.w_data, switches);
-        let policy_info = match &self.pilot {
-            Pilot::Inside(_, policy_info) => policy_info.clone(),
-            Pilot::Outside(_) => PolicyInfo::outside("companion"),
-        };
+        let policy_info = self.pilot.info();
         let picture = results::write_files(&order.out, &self.simulation, &figures, &policy_info.model)?;
         let wall_s = begun.elapsed().as_secs_f64();
         if order.json {

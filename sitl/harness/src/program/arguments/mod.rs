@@ -13,10 +13,12 @@ use crate::{AutopilotKind, EnergyModel, MissionPlan, Switch};
 use city::{CityCommand, RadioArguments};
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
+use gleaner_dashboard::http_address;
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
 use gleaner_units::{BatteryUnits, Degrees};
 use gleaner_world::ScenarioKind;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use values::{autopilot, grid_rotation, scenario, speed, speedup, switch, units, weight};
 
@@ -162,6 +164,9 @@ struct FlyArguments {
     /// Folder for trajectory.svg, flight.tlog and decisions.jsonl.
     #[arg(long, value_name = "DIR", default_value = "gleaner-flight")]
     out: PathBuf,
+    /// Also write the flight as a web page in one file: open it in a browser.
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -178,6 +183,10 @@ struct ServeArguments {
     /// The ground station's port.
     #[arg(long, value_name = "ENDPOINT", default_value = "udpout:127.0.0.1:14550")]
     gcs: Endpoint,
+    /// Serve the live page at this address: a port, or ADDRESS:PORT. Other computers need one of the tokens that are
+    /// printed.
+    #[arg(long, value_name = "ADDRESS", value_parser = http_address)]
+    http: Option<SocketAddr>,
     /// Times real time. A companion outside this process runs in real time, so use it with --onboard.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = speed)]
     speed: f32,
@@ -275,6 +284,7 @@ impl FlyArguments {
             mission_out: self.mission_out,
             json: self.json,
             out: self.out,
+            html: self.html,
         }
     }
 }
@@ -289,6 +299,7 @@ impl ServeArguments {
             companion: outside.then_some(self.companion),
             radio: outside.then_some(self.radio),
             ground: self.gcs,
+            http: self.http,
             speed: self.speed,
             auto_takeoff: self.auto_takeoff,
             mission_out: self.mission_out,

@@ -5,6 +5,7 @@ use crate::{AutopilotKind, MissionPlan, Switch};
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
 use std::fmt::Write as _;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 /// The task of this run.
@@ -138,6 +139,8 @@ pub(crate) struct FlyOrder {
     pub mission_out: Option<PathBuf>,
     pub json: bool,
     pub out: PathBuf,
+    /// The flight as a page.
+    pub html: Option<PathBuf>,
 }
 
 /// The ports of the board.
@@ -155,6 +158,8 @@ pub(crate) struct ServeOrder {
     pub companion: Option<Endpoint>,
     pub radio: Option<Endpoint>,
     pub ground: Endpoint,
+    /// Where the live page is served.
+    pub http: Option<SocketAddr>,
     pub speed: f32,
     pub auto_takeoff: bool,
     pub mission_out: Option<PathBuf>,
