@@ -47,10 +47,11 @@ const Charts = {
       const now = live && Math.abs(live.w_data - option.w) < 1e-6;
       const drawing = shape("svg", { viewBox: `0 0 ${grid.width} ${grid.height}`, role: "img",
         "aria-label": `Predicted path at a preference of ${option.w}` },
+      shape("image", { href: MapView.picture, width: grid.width, height: grid.height, opacity: 0.55, preserveAspectRatio: "none" }),
       ...devices.map((d) => shape("circle", { cx: d.x + 0.5, cy: up(d.y + 0.5), r: 0.7, fill: "var(--device)" })),
       shape("rect", { x: terminal[0], y: up(terminal[1] + 1), width: 1, height: 1, fill: "var(--terminal)" }),
-      MapView.path(option.path, up, ""));
-      drawing.lastChild.setAttribute("style", "fill:none;stroke:var(--path);stroke-width:.5");
+      MapView.path(option.path, up, "small-path"),
+      shape("circle", { cx: option.path[0][0] + 0.5, cy: up(option.path[0][1] + 0.5), r: 0.8, fill: "var(--aircraft)" }));
       return element("div", { class: now ? "card now" : "card" }, drawing,
         element("p", {}, element("strong", {}, `w = ${option.w}`), now ? " (now)" : ""),
         element("p", {}, `brings home ${percent(option.collected, 0)}`),

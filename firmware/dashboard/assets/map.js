@@ -6,6 +6,9 @@ function mix(low, high, share) {
 }
 
 const MapView = {
+  // The buildings as an image, for the small maps.
+  picture: "",
+
   // Paints the buildings once per size and colour scheme.
   city(scene) {
     const { width, height } = scene.grid;
@@ -27,6 +30,7 @@ const MapView = {
       context.fillStyle = mix(low, high, height_m / tallest);
       context.fillRect(x * scale, (height - 1 - y) * scale, scale, scale);
     });
+    this.picture = canvas.toDataURL();
     if (scene.fence) this.fence(context, scene, scale);
     this.sight(context, scene, scale);
     byId("legend").textContent =
@@ -91,7 +95,7 @@ const MapView = {
     const chosen = whatIf && live && whatIf.options.find((option) => Math.abs(option.w - live.w_data) < 0.126);
     if (chosen && t - whatIf.t_s < 20) parts.push(this.path(chosen.path, up, "ahead"));
     if (live && live.x !== null && decision) parts.push(...this.attention(scene, live, decision, up));
-    scene.devices.forEach((device, index) => parts.push(...this.device(device, live && live.devices[index], up)));
+    scene.devices.forEach((device, index) => parts.push(...this.device(device, live && live.devices[index], up, scene.grid.width)));
     if (live && live.x !== null) {
       parts.push(shape("circle", { class: "aircraft", cx: live.x, cy: up(live.y), r: 0.55 }));
     }
@@ -103,14 +107,17 @@ const MapView = {
     return shape("polyline", { class: kind, points: cells.map(([x, y]) => `${x + 0.5},${up(y + 0.5)}`).join(" ") });
   },
 
-  device(device, state, up) {
+  device(device, state, up, width) {
     const [x, y] = [device.x + 0.5, up(device.y + 0.5)];
     const share = state && device.data > 0 ? Math.min(1, state.remaining / device.data) : 1;
     const out = state && !state.reachable;
     return [
       shape("circle", { class: out ? "device out" : "device", cx: x, cy: y, r: 0.7 }),
       shape("circle", { class: "full", cx: x, cy: y, r: (0.55 * Math.sqrt(share)).toFixed(3) }),
-      shape("text", { x: x + 0.85, y: y - 0.35 }, String(device.id)),
+      // Inside the map at its east edge, too.
+      device.x + 3 > width
+        ? shape("text", { x: x - 0.85, y: y - 0.35, "text-anchor": "end" }, String(device.id))
+        : shape("text", { x: x + 0.85, y: y - 0.35 }, String(device.id)),
     ];
   },
 

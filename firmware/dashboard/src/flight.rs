@@ -104,6 +104,31 @@ pub struct Live {
     pub devices: Vec<DeviceState>,
 }
 
+impl Live {
+    /// Leaves out digits that the page does not show: a flight of ten minutes then stays below half a megabyte.
+    #[must_use]
+    pub fn rounded(mut self) -> Live {
+        for value in [&mut self.x, &mut self.y].into_iter().flatten() {
+            *value = round(*value, 1_000.0);
+        }
+        let tenths = [&mut self.height_m, &mut self.battery_units, &mut self.spare_units, &mut self.land_pct];
+        for value in tenths.into_iter().flatten() {
+            *value = round(*value, 10.0);
+        }
+        self.collected = round(self.collected, 10_000.0);
+        for device in &mut self.devices {
+            device.remaining = device.remaining.round();
+            device.snr_db = device.snr_db.map(|snr_db| round(snr_db, 10.0));
+        }
+        self
+    }
+}
+
+/// To a multiple of `1 / per`.
+pub(crate) fn round(value: f32, per: f32) -> f32 {
+    (value * per).round() / per
+}
+
 /// A device at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DeviceState {
@@ -189,7 +214,7 @@ impl Event {
     /// The name and the JSON of the event, as the stream carries them.
     pub(crate) fn encode(&self) -> (&'static str, String) {
         match self {
-            Event::Live(live) => ("live", json(live)),
+            Event::Live(live) => ("live", json(&live.clone().rounded())),
             Event::Decision(decision) => ("decision", json(decision)),
             Event::Text(text) => ("text", json(text)),
             Event::WhatIf(what_if) => ("what_if", json(what_if)),
@@ -246,6 +271,7 @@ impl Flight {
     }
 
     fn add_live(&mut self, live: Live) {
+        let live = live.rounded();
         let before = self.live.len().checked_sub(2).map(|index| self.live[index].t_s);
         match self.live.last_mut() {
             Some(newest) if before.is_some_and(|before| live.t_s - before < LIVE_INTERVAL_S) => {

@@ -40,8 +40,9 @@ const BODY_BYTES: usize = 1024;
 /// Longest time for the headers of a request, and for everything up to the first byte of its answer.
 const HEADER_TIME: Duration = Duration::from_secs(5);
 const ANSWER_TIME: Duration = Duration::from_secs(6);
-/// Shortest time between two commands.
+/// Shortest time between two commands, and the longest that one may wait for its turn.
 const COMMAND_INTERVAL: Duration = Duration::from_millis(100);
+const COMMAND_WAIT: Duration = Duration::from_secs(1);
 
 /// Why there is no page.
 #[derive(Debug, Error)]
@@ -79,6 +80,19 @@ struct Shared {
     access: Access,
     viewers: Arc<Semaphore>,
     next_command: Mutex<Instant>,
+}
+
+impl Shared {
+    /// Reserves the next place in the row of commands: the time until it, or `None` where that is too far away.
+    fn reserve_command(&self, now: Instant) -> Option<Duration> {
+        let mut next = self.next_command.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = (*next).max(now);
+        let wait = place - now;
+        (wait <= COMMAND_WAIT).then(|| {
+            *next = place + COMMAND_INTERVAL;
+            wait
+        })
+    }
 }
 
 /// An encoded event, ready for every viewer.
@@ -303,14 +317,10 @@ async fn command(State(shared): State<Arc<Shared>>, Json(command): Json<Command>
     {
         return (StatusCode::BAD_REQUEST, "the preference is a number from 0 to 1").into_response();
     }
-    {
-        let mut next = shared.next_command.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = Instant::now();
-        if now < *next {
-            return (StatusCode::TOO_MANY_REQUESTS, "too many commands, wait a moment").into_response();
-        }
-        *next = now + COMMAND_INTERVAL;
-    }
+    let Some(wait) = shared.reserve_command(Instant::now()) else {
+        return (StatusCode::TOO_MANY_REQUESTS, "too many commands, wait a moment").into_response();
+    };
+    tokio::time::sleep(wait).await;
     let (order, answered) = Order::new(command);
     if shared.orders.try_send(order).is_err() {
         return (StatusCode::SERVICE_UNAVAILABLE, "the program is busy with earlier commands")

@@ -1,6 +1,6 @@
 //! Decisions as the page shows them.
 
-use crate::flight::Decision;
+use crate::flight::{Decision, round};
 use gleaner_pilot::{LoggedDecision, Source};
 use gleaner_policy::{FIRST_DEVICE_TOKEN, Inference, Policy};
 use gleaner_units::{Action, ActionMask};
@@ -63,9 +63,9 @@ pub fn explain<P: Policy>(policy: &mut P, logged: &LoggedDecision) -> Option<Inf
     same.then_some(inference)
 }
 
-/// A flight of ten minutes stays below half a megabyte.
+/// Shares need no more digits on the page.
 fn thousandths(value: f32) -> f32 {
-    (value * 1000.0).round() / 1000.0
+    round(value, 1_000.0)
 }
 
 /// The softmax over the allowed actions; zero for the others.
