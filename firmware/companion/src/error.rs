@@ -127,7 +127,9 @@ pub enum StartError {
     #[error(transparent)]
     Page(#[from] gleaner_dashboard::ServerError),
     /// The page would command as an operator that is not allowed.
-    #[error("the page commands as {operator}, which `operators` leaves out: add \"{operator}\" there, or remove `http`")]
+    #[error(
+        "the page commands as {operator}, which `operators` leaves out: add \"{operator}\" there, or remove `http`"
+    )]
     PageOperator {
         /// `SYSTEM/COMPONENT`.
         operator: String,

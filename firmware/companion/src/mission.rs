@@ -25,7 +25,12 @@ fn show(order: &MissionShow) -> Result<ExitCode, StartError> {
     let (grid, fenced) = (mission.grid(), mission.fence.len());
     let cells = usize::from(grid.width()) * usize::from(grid.height());
     let tallest_m = scene.heights_m.iter().max().copied().unwrap_or(0);
-    println!("city        {} x {} cells of {} m, buildings up to {tallest_m} m", grid.width(), grid.height(), grid.cell().0);
+    println!(
+        "city        {} x {} cells of {} m, buildings up to {tallest_m} m",
+        grid.width(),
+        grid.height(),
+        grid.cell().0
+    );
     println!("rotation    {} degrees", scene.grid.rotation_deg);
     println!("fence       {fenced} of {cells} cells");
     println!("terminal    {}", mission.terminal);
@@ -35,7 +40,8 @@ fn show(order: &MissionShow) -> Result<ExitCode, StartError> {
     for (site, sight) in mission.devices.iter().zip(&scene.sight) {
         let seen = sight.bytes().filter(|&cell| cell == b'1').count();
         let home = guard.as_ref().and_then(|guard| guard.distance(site.cell));
-        let home = home.map_or("outside the fence".into(), |moves| format!("{moves} moves from the terminal"));
+        let home =
+            home.map_or("outside the fence".into(), |moves| format!("{moves} moves from the terminal"));
         println!(
             "device {:<4} {}, {} data units, in sight from {:.0} % of the cells at {} m, {home}",
             site.id,

@@ -30,8 +30,9 @@ pub fn report(order: &Report) -> Result<ExitCode, StartError> {
     let Some(first) = decisions.first() else { return Err(StartError::NoDecisions { path: log }) };
     let telemetry = fs::read(log.with_file_name("flight.tlog")).unwrap_or_default();
     let begin_s = first.run_s as f64;
-    let frames: Vec<(f64, &[u8])> =
-        telemetry_frames(&telemetry).map(|(unix_us, frame)| (unix_us as f64 * 1e-6 - begin_s, frame)).collect();
+    let frames: Vec<(f64, &[u8])> = telemetry_frames(&telemetry)
+        .map(|(unix_us, frame)| (unix_us as f64 * 1e-6 - begin_s, frame))
+        .collect();
     // The telemetry of another run has other times.
     let end_s = decisions.last().map_or(0.0, |last| last.time_us as f64 * 1e-6);
     let belongs = frames.iter().any(|(t_s, _)| (0.0..=end_s).contains(t_s));

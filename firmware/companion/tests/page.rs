@@ -36,7 +36,8 @@ fn the_page_commands_like_a_ground_station() {
     let answer = ask(address, "POST /api/command", "", r#"{"preference":0.75}"#);
     assert!(answer.contains("acknowledged: accepted"), "{answer}");
     autopilot.await_text("gleaner: preference w_data 0.75");
-    let answer = ask(address, "POST /api/command", "Origin: http://evil.example\r\n", r#"{"request":"engage"}"#);
+    let answer =
+        ask(address, "POST /api/command", "Origin: http://evil.example\r\n", r#"{"request":"engage"}"#);
     assert!(answer.starts_with("HTTP/1.1 403"), "{answer}");
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");
@@ -55,7 +56,9 @@ fn an_open_page_needs_the_tokens_of_the_configuration() {
     let port = line.split("0.0.0.0:").last().unwrap().split('/').next().unwrap();
     let address = format!("127.0.0.1:{port}");
     let command = r#"{"request":"return"}"#;
-    let with = |token: &str| ask(&address, "POST /api/command", &format!("Authorization: Bearer {token}\r\n"), command);
+    let with = |token: &str| {
+        ask(&address, "POST /api/command", &format!("Authorization: Bearer {token}\r\n"), command)
+    };
     assert!(ask(&address, "POST /api/command", "", command).starts_with("HTTP/1.1 401"));
     assert!(with("view-0123456789abcdef").starts_with("HTTP/1.1 403"));
     // No autopilot is there, so no pilot answers; the command was taken.

@@ -112,7 +112,9 @@ pub fn http_address(text: &str) -> Result<SocketAddr, String> {
     let (host, port) = text.rsplit_once(':').unwrap_or(("127.0.0.1", text));
     let host = if host == "localhost" { "127.0.0.1" } else { host };
     format!("{host}:{port}").parse().map_err(|_| {
-        format!("{text:?} is no address of a page: write a port, as in 8080, or ADDRESS:PORT, as in 0.0.0.0:8080")
+        format!(
+            "{text:?} is no address of a page: write a port, as in 8080, or ADDRESS:PORT, as in 0.0.0.0:8080"
+        )
     })
 }
 

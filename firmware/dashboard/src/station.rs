@@ -238,8 +238,7 @@ impl Station {
         let firmware = Firmware::from_wire(heartbeat.autopilot);
         self.firmware = Some(firmware);
         self.armed = heartbeat.armed;
-        self.mode =
-            Some(FlightMode::from_custom_mode(firmware, heartbeat.vehicle, heartbeat.custom_mode));
+        self.mode = Some(FlightMode::from_custom_mode(firmware, heartbeat.vehicle, heartbeat.custom_mode));
     }
 }
 

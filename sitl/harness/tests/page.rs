@@ -91,9 +91,13 @@ fn a_command_of_the_page_flies_the_simulated_aircraft() {
     assert!(served.command(r#"{"preference":0.25}"#).contains("acknowledged: accepted"));
     assert!(served.command(r#"{"request":"engage"}"#).contains("acknowledged: accepted"));
     let live = until(&mut stream, "live", |live| live["state"] == "engaged");
-    assert_eq!((live["w_data"].as_f64(), live["owner"].as_str()), (Some(0.25), Some("Gleaner flies the mission")));
+    assert_eq!(
+        (live["w_data"].as_f64(), live["owner"].as_str()),
+        (Some(0.25), Some("Gleaner flies the mission"))
+    );
     let decision = until(&mut stream, "decision", |decision| decision["sequence"] == 1);
-    let sum: f64 = decision["probabilities"].as_array().unwrap().iter().map(|share| share.as_f64().unwrap()).sum();
+    let sum: f64 =
+        decision["probabilities"].as_array().unwrap().iter().map(|share| share.as_f64().unwrap()).sum();
     assert!((sum - 1.0).abs() < 0.01, "{decision}");
     assert_eq!(decision["attention"].as_array().unwrap().len(), 3 + 6);
     let forecast = until(&mut stream, "what_if", |_| true);
@@ -107,7 +111,8 @@ fn a_command_of_the_page_flies_the_simulated_aircraft() {
 #[test]
 fn the_page_of_an_outside_pilot_is_served_before_it_connects() {
     let folder = tempfile::tempdir().unwrap();
-    let served = Served::start(folder.path(), &["--companion", "tcpin:127.0.0.1:0", "--radio", "tcpin:127.0.0.1:0"]);
+    let served =
+        Served::start(folder.path(), &["--companion", "tcpin:127.0.0.1:0", "--radio", "tcpin:127.0.0.1:0"]);
     let mut stream = served.ask("GET /api/events", "");
     let live = until(&mut stream, "live", |live| live["mode"] == "GUIDED");
     assert_eq!(live["state"], "not heard");

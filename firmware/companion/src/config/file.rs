@@ -193,10 +193,10 @@ impl Source<'_> {
             (Some(view), Some(control)) => {
                 Ok(Some([token("view_token", view)?, token("control_token", control)?]))
             }
-            (Some(one), None) | (None, Some(one)) => Err(self.fault(
-                one.span().start,
-                "page: give view_token and control_token, or neither".into(),
-            )),
+            (Some(one), None) | (None, Some(one)) => {
+                Err(self
+                    .fault(one.span().start, "page: give view_token and control_token, or neither".into()))
+            }
         }
     }
 

@@ -63,7 +63,12 @@ impl Page {
     }
 
     /// Shows what a pilot in this process knows.
-    pub fn show_pilot<P: Policy>(&mut self, simulation: &mut Simulation, now: Instant, onboard: &mut Onboard<P>) {
+    pub fn show_pilot<P: Policy>(
+        &mut self,
+        simulation: &mut Simulation,
+        now: Instant,
+        onboard: &mut Onboard<P>,
+    ) {
         if let Some(decision) = onboard.decision().cloned() {
             let question = Question {
                 decision: LoggedDecision::new(0, &decision, None),
