@@ -33,9 +33,9 @@ pub fn report(order: &Report) -> Result<ExitCode, StartError> {
     let frames: Vec<(f64, &[u8])> = telemetry_frames(&telemetry)
         .map(|(unix_us, frame)| (unix_us as f64 * 1e-6 - begin_s, frame))
         .collect();
-    // The telemetry of another run has other times.
+    // The telemetry of another run has other times. The start of the run is logged in whole seconds.
     let end_s = decisions.last().map_or(0.0, |last| last.time_us as f64 * 1e-6);
-    let belongs = frames.iter().any(|(t_s, _)| (0.0..=end_s).contains(t_s));
+    let belongs = frames.iter().any(|(t_s, _)| (0.0..=end_s + 1.0).contains(t_s));
     let frames = if belongs { frames } else { Vec::new() };
     let system = settings.system_id.or_else(|| autopilot_system(&frames)).unwrap_or(1);
     let title = format!(

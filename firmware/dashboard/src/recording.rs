@@ -105,6 +105,12 @@ impl<P: Policy> Recording<P> {
 
     /// The flight so far.
     #[must_use]
+    pub const fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
+    /// The whole flight.
+    #[must_use]
     pub fn finish(self) -> Flight {
         self.flight
     }

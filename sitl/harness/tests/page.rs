@@ -2,13 +2,15 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 /// Killed when a test fails.
 struct Served {
     child: Child,
     address: String,
+    /// Open to the end: the program ends when it cannot print.
+    _output: BufReader<ChildStdout>,
 }
 
 impl Drop for Served {
@@ -30,10 +32,11 @@ impl Served {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(|line| line.unwrap());
+        let mut output = BufReader::new(child.stdout.take().unwrap());
+        let mut lines = output.by_ref().lines().map(|line| line.unwrap());
         let page = lines.find_map(|line| line.strip_prefix("page http://").map(str::to_owned));
         let address = page.expect("the page's address").trim_end_matches('/').to_owned();
-        Served { child, address }
+        Served { child, address, _output: output }
     }
 
     fn ask(&self, request: &str, body: &str) -> BufReader<TcpStream> {

@@ -5,8 +5,7 @@ use crate::config::Config;
 use crate::error::StartError;
 use gleaner_dashboard::{Access, Dashboard, Question, Scene, Server, ServerError, live, scene, shown};
 use gleaner_link::{Address, Parameters};
-use gleaner_pilot::{Decision, LoggedDecision, Mission, Onboard};
-use gleaner_policy::Policy;
+use gleaner_pilot::{Decision, Deliberator, LoggedDecision, Mission, Onboard};
 use gleaner_units::Instant;
 use std::time;
 
@@ -56,7 +55,7 @@ impl Page {
     }
 
     /// Publishes what is due. Returns frames of the page's ground station for the pilot.
-    pub fn poll<P: Policy>(&mut self, now: time::Instant, onboard: &Onboard<P>) -> Vec<Vec<u8>> {
+    pub fn poll<P: Deliberator>(&mut self, now: time::Instant, onboard: &Onboard<P>) -> Vec<Vec<u8>> {
         let Some(dashboard) = &mut self.dashboard else { return Vec::new() };
         dashboard.set_pilot(onboard.link().address());
         let at = clock::at(now);
@@ -68,7 +67,7 @@ impl Page {
     }
 
     /// A decision was made.
-    pub fn decided<P: Policy>(&mut self, now: Instant, decision: &Decision, onboard: &Onboard<P>) {
+    pub fn decided<P: Deliberator>(&mut self, now: Instant, decision: &Decision, onboard: &Onboard<P>) {
         let Some(dashboard) = &mut self.dashboard else { return };
         let question = Question {
             decision: LoggedDecision::new(0, decision, None),

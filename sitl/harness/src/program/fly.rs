@@ -3,11 +3,11 @@
 use super::announce::{ports, write_mission};
 use super::arguments::{BoardOrder, FlyOrder};
 use super::results::PolicyInfo;
-use super::{ProgramError, load, model, page, results};
+use super::{ProgramError, load, model, page, results, watch};
 use crate::{
     Ending, Figures, FlightError, FlightResult, FlightRun, FlightScript, MissionSetup, Wired, fly_wired,
 };
-use gleaner_pilot::{Budget, LookingAhead, Settings};
+use gleaner_pilot::{Budget, Deliberator, LookingAhead, Settings};
 use gleaner_ports::{Endpoint, Port};
 use std::time::{Duration, Instant};
 
@@ -26,8 +26,11 @@ pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
             let policy = model::load(order.model.as_deref(), order.engine)?;
             let policy_info = model::info(&policy);
             let flown = match order.lookahead {
-                true => crate::fly(setup, script, LookingAhead::new(policy, Budget::LINUX), Ok(())),
-                false => crate::fly(setup, script, policy, Ok(())),
+                true => {
+                    let policy = LookingAhead::new(policy, Budget::LINUX);
+                    fly_inside(order, setup, script, policy, &policy_info)
+                }
+                false => fly_inside(order, setup, script, policy, &policy_info),
             };
             (flown?, policy_info)
         }
@@ -38,7 +41,7 @@ pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
     if let Some(path) = &order.html {
         // A board flies its own copy of the model; decisions of another model stay unexplained.
         let policy = model::load(order.model.as_deref(), order.engine)?;
-        page::write(path, &flown.simulation, page::title(&flown.simulation, &policy_info), policy)?;
+        page::write(path, &flown.simulation, page::title(flown.simulation.setup(), &policy_info), policy)?;
     }
     let wall_s = begun.elapsed().as_secs_f64();
     if order.json {
@@ -50,6 +53,22 @@ pub(super) fn fly(order: &FlyOrder) -> Result<bool, ProgramError> {
         results::print(&lines, &figures, wall_s, &picture);
     }
     Ok(figures.is_good())
+}
+
+/// Flies with the pilot in this process.
+fn fly_inside<P: Deliberator>(
+    order: &FlyOrder,
+    setup: MissionSetup,
+    script: FlightScript,
+    policy: P,
+    policy_info: &PolicyInfo,
+) -> Result<FlightResult, ProgramError> {
+    if !order.watch {
+        return Ok(crate::fly(setup, script, policy, Ok(()))?);
+    }
+    let explainer = model::load(order.model.as_deref(), order.engine)?;
+    let title = page::title(&setup, policy_info);
+    watch::fly(setup, script, policy, explainer, title)
 }
 
 /// Waits for the board, then flies with it.

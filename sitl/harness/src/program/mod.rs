@@ -12,6 +12,7 @@ mod results;
 mod serve;
 mod shrink;
 mod sweep;
+mod watch;
 
 pub use arguments::Arguments;
 
@@ -76,6 +77,9 @@ pub enum ProgramError {
     /// The standard output is closed.
     #[error("cannot print: {0}: give it a standard output")]
     Stdout(io::Error),
+    /// There is no terminal to draw in.
+    #[error("--watch draws in a terminal and this output is none: run it in a terminal, or use --html")]
+    NoTerminal,
     /// The operating system does not wait for a connection.
     #[error("cannot wait for a connection: {0}: free some memory, or file descriptors")]
     Wait(io::Error),

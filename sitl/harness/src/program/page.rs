@@ -11,7 +11,7 @@ use gleaner_dashboard::{
     live, render, scene, shown, shown_logged,
 };
 use gleaner_link::Address;
-use gleaner_pilot::{LoggedDecision, Onboard, Settings};
+use gleaner_pilot::{Deliberator, LoggedDecision, Onboard, Settings};
 use gleaner_policy::schema::REACHABLE_SNR_DB;
 use gleaner_policy::{Engine, Policy};
 use gleaner_units::{BatteryUnits, Duration, Instant, Metres};
@@ -42,7 +42,7 @@ impl Page {
         let scene = Scene {
             controls: true,
             incidents: incidents.iter().map(|(name, _)| name.clone()).collect(),
-            ..fixed(setup, title(simulation, policy_info))
+            ..fixed(setup, title(setup, policy_info))
         };
         let access = Access::of(address, None).map_err(ServerError::from)?;
         let server = Server::start(address, access, scene)?;
@@ -63,7 +63,7 @@ impl Page {
     }
 
     /// Shows what a pilot in this process knows.
-    pub fn show_pilot<P: Policy>(
+    pub fn show_pilot<P: Deliberator>(
         &mut self,
         simulation: &mut Simulation,
         now: Instant,
@@ -86,7 +86,7 @@ impl Page {
         let new = simulation.journal().slots().get(self.slots..).unwrap_or_default();
         self.slots += new.len();
         for slot in new {
-            let Some(decision) = slot.logged(&setup.mission) else { continue };
+            let Some(decision) = slot.logged(setup) else { continue };
             let inference = explain(&mut self.policy, &decision);
             let shown = shown_logged(&decision, inference.as_ref());
             let (devices, reserve) = (slot.heard.clone(), setup.plan.reserve);
@@ -167,20 +167,27 @@ pub(super) fn write(
     title: String,
     policy: Engine,
 ) -> Result<(), ProgramError> {
-    let setup = simulation.setup();
-    let mission = &setup.mission;
-    let mut recording =
-        Recording::new(fixed(setup, title), mission, pilot(setup), setup.plan.reserve, policy);
-    let journal = simulation.journal();
-    let decisions: Vec<_> = journal.slots().iter().filter_map(|slot| slot.logged(mission)).collect();
-    recording.replay(&decisions, journal.frames().map(|(at, frame)| (seconds(at), frame)));
+    let mut recording = recording(simulation.setup(), title, policy);
+    replay(&mut recording, simulation);
     let page = render(&recording.finish());
     std::fs::write(path, page).map_err(|source| ProgramError::Write { path: path.into(), source })
 }
 
+/// A recording of the flight of this mission, to be fed from its journal.
+pub(super) fn recording<P: Policy>(setup: &MissionSetup, title: String, policy: P) -> Recording<P> {
+    Recording::new(fixed(setup, title), &setup.mission, pilot(setup), setup.plan.reserve, policy)
+}
+
+/// Records the whole journal.
+pub(super) fn replay<P: Policy>(recording: &mut Recording<P>, simulation: &Simulation) {
+    let (journal, setup) = (simulation.journal(), simulation.setup());
+    let decisions: Vec<_> = journal.slots().iter().filter_map(|slot| slot.logged(setup)).collect();
+    recording.replay(&decisions, journal.frames().map(|(at, frame)| (seconds(at), frame)));
+}
+
 /// One line for the head of the page.
-pub(super) fn title(simulation: &Simulation, policy_info: &PolicyInfo) -> String {
-    let plan = &simulation.setup().plan;
+pub(super) fn title(setup: &MissionSetup, policy_info: &PolicyInfo) -> String {
+    let plan = &setup.plan;
     let (scenario, seed, autopilot) = (plan.kind.name().to_uppercase(), plan.seed, plan.autopilot);
     format!("simulated {scenario}, seed {seed}, {autopilot}, model {}", policy_info.model)
 }
@@ -193,6 +200,6 @@ fn pilot(setup: &MissionSetup) -> Address {
     Address::new(setup.aircraft.system_id, Settings::default().component_id)
 }
 
-fn seconds(at: Instant) -> f64 {
+pub(super) fn seconds(at: Instant) -> f64 {
     at.as_micros() as f64 * 1e-6
 }

@@ -164,6 +164,9 @@ struct FlyArguments {
     /// Folder for trajectory.svg, flight.tlog and decisions.jsonl.
     #[arg(long, value_name = "DIR", default_value = "gleaner-flight")]
     out: PathBuf,
+    /// Show the flight in this terminal while it is flown: + and - change its speed, q ends the showing.
+    #[arg(long, conflicts_with_all = ["board", "json"])]
+    watch: bool,
     /// Also write the flight as a web page in one file: open it in a browser.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
@@ -285,6 +288,7 @@ impl FlyArguments {
             json: self.json,
             out: self.out,
             html: self.html,
+            watch: self.watch,
         }
     }
 }

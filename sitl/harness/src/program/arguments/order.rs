@@ -141,6 +141,8 @@ pub(crate) struct FlyOrder {
     pub out: PathBuf,
     /// The flight as a page.
     pub html: Option<PathBuf>,
+    /// Show the flight in the terminal.
+    pub watch: bool,
 }
 
 /// The ports of the board.
