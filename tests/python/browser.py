@@ -85,8 +85,10 @@ class Viewer:
         return self.page.locator("#figures div", has=self.page.locator("dt", has_text=name)).locator("dd")
 
     def photograph(self, what, pictures):
-        """The first screen, and the whole page in both colour schemes and on a phone."""
-        self.page.screenshot(path=pictures / f"{what}.png")
+        """The upper part, and the whole page in both colour schemes and on a phone."""
+        upper = {"x": 0, "y": 0, "width": DESKTOP["width"], "height": 1430}
+        if self.page.evaluate("document.documentElement.scrollHeight") >= upper["height"]:
+            self.page.screenshot(path=pictures / f"{what}.png", full_page=True, clip=upper)
         for scheme in ("dark", "light"):
             self.page.emulate_media(color_scheme=scheme)
             self.page.screenshot(path=pictures / f"{what}-{scheme}.png", full_page=True)

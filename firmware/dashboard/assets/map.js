@@ -33,10 +33,16 @@ const MapView = {
     this.picture = canvas.toDataURL();
     if (scene.fence) this.fence(context, scene, scale);
     this.sight(context, scene, scale);
-    byId("legend").textContent =
-      `Buildings up to ${tallest} m: the darker or brighter, the taller. Cells of ${scene.grid.cell_m} m, ` +
-      `grid north ${scene.grid.rotation_deg ? `${scene.grid.rotation_deg}° clockwise of true north` : "up"}. ` +
-      "Ring: device, filled by the data left, dashed out of reach. Square: terminal. Line to a device: attention.";
+    byId("legend").textContent = this.legend(scene, tallest);
+  },
+
+  legend(scene, tallest) {
+    const { cell_m, rotation_deg } = scene.grid;
+    const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    return `Buildings up to ${tallest} m, the ${dark ? "brighter" : "darker"} the taller. Cells of ${cell_m} m, ` +
+      `grid north ${rotation_deg ? `${rotation_deg}° clockwise of true north` : "up"}. ` +
+      `${scene.fence ? "Hatched: outside the fence. " : ""}Square: terminal. Ring: device, filled by the data left, ` +
+      "dashed out of reach. Line to a device: attention.";
   },
 
   // Cells that may not be flown over, hatched.

@@ -41,19 +41,32 @@ const Panels = {
   },
 
   devices(scene, live) {
-    const head = ["Device", "Data left", "of", "SNR", "Reachable"].map((name) => element("th", { scope: "col" }, name));
-    const rows = scene.devices.map((device, index) => {
-      const state = live && live.devices[index];
-      const cells = state
-        ? [number(state.remaining, 0), number(device.data, 0), state.snr_db === null ? "not heard" : number(state.snr_db, 1, " dB"),
-          state.reachable ? "yes" : "no"]
-        : ["unknown", number(device.data, 0), "not heard", "no"];
-      return element("tr", {}, element("th", { scope: "row" }, String(device.id)),
-        ...cells.map((text) => element("td", {}, text)));
-    });
+    const [names, cells] = live ? this.heard(live) : this.planned(scene);
+    const head = ["Device", ...names].map((name) => element("th", { scope: "col" }, name));
+    const rows = scene.devices.map((device, index) => element("tr", {},
+      element("th", { scope: "row" }, String(device.id)),
+      ...cells(device, index).map((text) => element("td", {}, text))));
     byId("devices").replaceChildren(
-      element("caption", { class: "hidden" }, "Devices: data left, SNR and reachability"),
+      element("caption", { class: "hidden" }, `Devices: ${names.join(", ")}`),
       element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows));
+  },
+
+  // In flight: what the radio reports.
+  heard(live) {
+    return [["Data left", "of", "SNR", "Reachable"], (device, index) => {
+      const state = live.devices[index];
+      return [number(state.remaining, 0), number(device.data, 0),
+        state.snr_db === null ? "not heard" : number(state.snr_db, 1, " dB"), state.reachable ? "yes" : "no"];
+    }];
+  },
+
+  // Before the flight: where each device stands, and the share of the cells with line of sight to it.
+  planned(scene) {
+    return [["Cell", "Data", "In sight from"], (device, index) => {
+      const sight = scene.sight[index] || "";
+      const seen = [...sight].filter((cell) => cell === "1").length;
+      return [`${device.x}, ${device.y}`, number(device.data, 0), sight ? percent(seen / sight.length) : "unknown"];
+    }];
   },
 
   attention(scene, decision) {
