@@ -81,6 +81,7 @@ fn a_run_becomes_a_page_and_so_does_its_mission() {
     let mut running = Running::start(&mut fixture.gleaner("run"));
     let mut autopilot = FakeAutopilot::find(&mut running);
     autopilot.await_decision();
+    autopilot.await_text("gleaner: shadow, commanding nothing");
     assert_eq!(running.stop().0, Some(0));
     let at = |name: &str| fixture.path(name);
     let gleaner = || std::process::Command::new(env!("CARGO_BIN_EXE_gleaner"));
