@@ -13,7 +13,7 @@ use ratatui::widgets::{Block, Paragraph, Row, Table};
 /// Buildings of this height and more are drawn brighter, m.
 const TALL_M: u8 = 25;
 /// Width of the panels beside the map, characters.
-const PANELS: u16 = 46;
+const PANELS: u16 = 56;
 /// Length of a bar, characters.
 const BAR: f32 = 20.0;
 
