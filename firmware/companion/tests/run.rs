@@ -45,8 +45,13 @@ fn every_decision_is_logged_whole() {
     let first: serde_json::Value = serde_json::from_str(text.lines().next().unwrap()).unwrap();
     assert_eq!(first["state"], "shadow");
     assert_eq!(first["cell"], serde_json::json!([1, 0]));
-    assert_eq!(first["action"], "hover");
-    assert_eq!(first["mask"].as_array().unwrap()[0], "hover");
+    let mask = first["mask"].as_array().unwrap();
+    assert!(mask.contains(&first["action"]) && mask[0] == "hover", "{first}");
+    // Look-ahead is on by default; the first decision of a mission has the mission.
+    let lookahead = &first["lookahead"];
+    assert_eq!((&lookahead["budget"], &lookahead["slot"]), (&1000.into(), &0.into()), "{lookahead}");
+    assert_eq!(lookahead["devices"].as_array().unwrap().len(), 1);
+    assert_eq!(lookahead["mission"]["heights_m"].as_array().unwrap().len(), 12);
     assert_eq!(first["battery"], 20.0);
     assert_eq!(first["logits"], serde_json::json!(LOGITS));
     assert_eq!(first["w_data"], 0.25);

@@ -246,7 +246,7 @@ impl<const D: usize> LookAhead<D> {
         }
     }
 
-    /// The present state, with the transmission that live SNR announces for this slot.
+    /// The present state, with the transmission that follows from live SNR in this slot.
     pub(crate) fn state(&self, view: &View<'_>) -> State<D> {
         let data = view.devices.iter().map(|device| finite(device.remaining));
         let mut state = State::new(view.cell, view.battery, data);

@@ -1,4 +1,4 @@
-//! What-if: the path from here, and what it would bring home, under other preferences.
+//! What-if: the path from here under other preferences, with the data and energy expected of it.
 
 use crate::decide::W_DATA_MAX;
 use crate::{Budget, Effort, Expected, LookAhead, Onboard, Problem, STOPS_MAX, Tour, View};

@@ -13,6 +13,7 @@ use gleaner_world::{City, Fading, Realization, ScenarioError, Seed, World};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A row of the table: how the world differs.
 #[derive(Clone, Copy, Debug)]
@@ -107,25 +108,33 @@ impl Arena {
         Ok(Arena { row, setting, world, drawn, map })
     }
 
-    /// Flies all systems but the oracle.
+    /// Flies all systems but the oracle. Also gives the times of the network and of the look-ahead, one per decision.
     ///
     /// # Errors
     /// The policy failed.
-    pub fn compare<P>(&self, policy: &mut P, budget: Budget) -> Result<Compared, DeciderError>
+    pub fn compare<P>(
+        &self,
+        policy: &mut P,
+        budget: Budget,
+    ) -> Result<(Compared, [Vec<Duration>; 2]), DeciderError>
     where
         P: Policy<Error: Display>,
     {
         let has_map = self.row.mismatch.map != MapError::Flat;
-        Ok(Compared {
+        let network = self.fly(&mut Engine(&mut *policy))?;
+        let mut looking = LookingAhead::new(policy, budget).with_map(has_map);
+        let lookahead = self.fly(&mut looking)?;
+        let compared = Compared {
             row: self.row.name.to_owned(),
             scenario: self.setting.kind.name().to_owned(),
             devices: self.setting.devices,
             battery: self.setting.battery,
-            network: self.fly(&mut Engine(&mut *policy))?,
-            lookahead: self.fly(&mut LookingAhead::new(policy, budget).with_map(has_map))?,
+            network,
+            lookahead,
             greedy: data(fly_greedy(&self.world, &self.drawn).0.last()),
             oracle: Vec::new(),
-        })
+        };
+        Ok((compared, looking.into_times()))
     }
 
     fn fly(&self, decider: &mut dyn Decider) -> Result<Vec<f32>, DeciderError> {
@@ -181,7 +190,7 @@ mod tests {
         let row = |name| *ROWS.iter().find(|row: &&Row| row.name == name).unwrap();
         let fly = |name| {
             let setting = Setting::trained(ScenarioKind::ReturnBase);
-            Arena::new(row(name), setting, 2).unwrap().compare(&mut Hover, Budget { tours: 60 }).unwrap()
+            Arena::new(row(name), setting, 2).unwrap().compare(&mut Hover, Budget { tours: 60 }).unwrap().0
         };
         let nominal = fly("nominal");
         assert!(

@@ -5,6 +5,7 @@ use crate::judge::evaluation::{Decider, DeciderError};
 use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, Source, View};
 use gleaner_policy::{DeviceState, K_MAX, Policy};
 use gleaner_units::{Action, Sight};
+use std::time::{Duration, Instant};
 
 /// Decisions by [`Source`]: network, kept plan, device order, single move.
 pub type SourceCounts = [u64; 4];
@@ -17,6 +18,8 @@ pub struct LookingAhead<'a, P> {
     has_map: bool,
     flights: Vec<LookAhead<K_MAX>>,
     sources: SourceCounts,
+    /// Of the network and of the look-ahead.
+    times: [Vec<Duration>; 2],
 }
 
 impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
@@ -24,7 +27,15 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
     #[must_use]
     pub fn new(policy: &'a mut P, budget: Budget) -> LookingAhead<'a, P> {
         let settings = FitSettings::DEFAULT;
-        LookingAhead { policy, budget, settings, has_map: true, flights: Vec::new(), sources: [0; 4] }
+        LookingAhead {
+            policy,
+            budget,
+            settings,
+            has_map: true,
+            flights: Vec::new(),
+            sources: [0; 4],
+            times: Default::default(),
+        }
     }
 
     /// Sets whether there is a map of buildings on board; without one the policy decides alone.
@@ -41,6 +52,12 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
         self
     }
 
+    /// How long the network and the look-ahead took, for each decision.
+    #[must_use]
+    pub fn into_times(self) -> [Vec<Duration>; 2] {
+        self.times
+    }
+
     /// How many decisions came from each source.
     #[must_use]
     pub const fn sources(&self) -> SourceCounts {
@@ -48,7 +65,9 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
     }
 
     fn decide_one(&mut self, number: usize, flight: &Flight) -> Result<Action, DeciderError> {
+        let begun = Instant::now();
         let answer = self.policy.infer(&flight.tokens()).map_err(|error| DeciderError(error.to_string()))?;
+        self.times[0].push(begun.elapsed());
         let devices: Vec<DeviceState> = flight.device_states().collect();
         while self.flights.len() <= number {
             self.flights.push(LookAhead::new(ChannelModel::NOMINAL, self.settings));
@@ -65,9 +84,11 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
             guard: flight.guard(),
             devices: &devices,
         };
+        let begun = Instant::now();
         let choice = lookahead
             .propose(&view, &answer.logits, flight.mask(), self.budget)
             .ok_or_else(|| DeciderError("no action is allowed".into()))?;
+        self.times[1].push(begun.elapsed());
         let source = match choice.source {
             Source::Network => 0,
             Source::KeptPlan => 1,

@@ -47,13 +47,15 @@ fn a_sweep_reports_the_same_twice() {
         let output = command.arg(folder.path()).args(more).output().unwrap();
         serde_json::from_slice(&output.stdout).unwrap()
     };
-    for kind in ["ardupilot", "px4"] {
-        let report = sweep(&["--autopilot-kind", kind]);
-        assert_eq!(report, sweep(&["--autopilot-kind", kind, "--jobs", "1"]), "on any number of threads");
+    for (kind, lookahead) in [("ardupilot", "1"), ("px4", "0")] {
+        let setting = ["--autopilot-kind", kind, "--lookahead", lookahead];
+        let report = sweep(&setting);
+        let alone = [&setting[..], &["--jobs", "1"]].concat();
+        assert_eq!(report, sweep(&alone), "on any number of threads");
         let flights: u64 =
             report["rows"].as_object().unwrap().values().map(|row| row["flights"].as_u64().unwrap()).sum();
         assert_eq!(flights, 40);
-        let calm = sweep(&["--calm", "--autopilot-kind", kind]);
+        let calm = sweep(&[&setting[..], &["--calm"]].concat());
         assert_eq!(calm["findings"], serde_json::json!([]));
     }
 }
