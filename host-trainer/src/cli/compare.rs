@@ -5,9 +5,9 @@ use anyhow::{Context, Result};
 use gleaner_host_trainer::judge::comparison::{Arena, HEADING, ROWS, Row};
 use gleaner_host_trainer::judge::paper::Setting;
 use gleaner_host_trainer::planner::Rates;
-use gleaner_host_trainer::planner::oracle::{Thoroughness, consult_under};
+use gleaner_host_trainer::planner::oracle::{Thoroughness, consult};
 use gleaner_lookahead::Budget;
-use gleaner_policy::{Engine, EngineKind, Preference};
+use gleaner_policy::{Engine, EngineKind};
 use gleaner_world::{Realization, ScenarioKind, Seed};
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -102,10 +102,8 @@ fn oracle(arguments: &Arguments, arena: &Arena, row: Row, setting: Setting) -> R
     }
     let rates = Rates::new(Arc::clone(&arena.world));
     let thoroughness = Thoroughness { tours: arguments.oracle };
-    // The searches under smaller weights give the last one a good tour to start from.
-    let preferences: Vec<Preference> = [0.5, 0.8, 1.0].into_iter().filter_map(Preference::new).collect();
     let best = |(_, realization): &(Seed, Realization)| {
-        consult_under(&rates, realization, &preferences, thoroughness).last().map_or(0.0, percent)
+        consult(&rates, realization, thoroughness).last().map_or(0.0, percent)
     };
     Ok(arena.drawn.par_iter().map(best).collect())
 }

@@ -5,7 +5,6 @@ use crate::env::flight::Reward;
 use crate::judge::evaluation::{Missions, test_preferences};
 use crate::planner::{Effort, Problem, Rates, Tour, W_DATA_MAX, initial_state};
 use gleaner_lookahead::Model;
-use gleaner_policy::Preference;
 use gleaner_world::Realization;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -69,22 +68,11 @@ const FROM_PREVIOUS: [f32; 2] = [1.5, 0.03];
 /// One mission under every test preference: percent of data, and minus battery units.
 #[must_use]
 pub fn consult(rates: &Rates, realization: &Realization, thoroughness: Thoroughness) -> Vec<Reward> {
-    consult_under(rates, realization, &test_preferences(), thoroughness)
-}
-
-/// One mission under these preferences, by rising weight of data: each search starts from the tour of the one before.
-#[must_use]
-pub fn consult_under(
-    rates: &Rates,
-    realization: &Realization,
-    preferences: &[Preference],
-    thoroughness: Thoroughness,
-) -> Vec<Reward> {
     let known = rates.study(realization);
     let state = initial_state(realization);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut tour = Tour::default();
-    preferences
+    test_preferences()
         .iter()
         .map(|preference| {
             let problem =
