@@ -4,7 +4,7 @@ use super::*;
 use crate::doubles::{Controller, Delay, Input, Output};
 use core::cell::Cell as StdCell;
 use gleaner_pilot::{Mission, Settings};
-use gleaner_policy::{Inference, SelfTestError, Tokens};
+use gleaner_policy::{Inference, Policy, SelfTestError, Tokens};
 use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap, Metres};
 use std::thread_local;
 
