@@ -155,11 +155,10 @@ mod tests {
 
     fn acknowledgement(sender: Address, command: MavCmd) -> Frame {
         let mut speaker = GroundClient::new(sender, OWN, Instant::now());
-        decoded(&speaker.frame(&COMMAND_ACK_DATA {
-            command,
-            result: MavResult::MAV_RESULT_DENIED,
-            ..COMMAND_ACK_DATA::DEFAULT
-        }))
+        // Its other fields depend on a feature of the dialect.
+        let mut ack = COMMAND_ACK_DATA::DEFAULT;
+        (ack.command, ack.result) = (command, MavResult::MAV_RESULT_DENIED);
+        decoded(&speaker.frame(&ack))
     }
 
     #[test]
