@@ -53,7 +53,7 @@ pub struct Arguments {
     /// mission.
     #[arg(long, value_name = "PARTS", requires = "oracle")]
     bound: Option<u32>,
-    /// Also fly the model with look-ahead, with this many tours per decision; 1000 take one to two milliseconds. With
+    /// Also fly the model with look-ahead, with this many tours per decision; 1000 take some milliseconds. With
     /// `--no-map` the network decides alone.
     #[arg(long, value_name = "TOURS", requires = "model")]
     lookahead: Option<u32>,
