@@ -38,7 +38,10 @@ fn conversion_errors_are_one_line() {
     let out = folder.path().join("model.gln");
     let out = out.to_str().unwrap();
     for (arguments, line) in [
-        (vec!["convert", "README.md", "--out", out], "gleaner: model README.md: not an ONNX model ("),
+        (
+            vec!["convert", "README.md", "--out", out],
+            "gleaner: model README.md: damaged, or not an ONNX model (",
+        ),
         (
             vec!["convert", "models/gleaner.onnx", "--out", "/nowhere/x.gln"],
             "gleaner: /nowhere/x.gln: cannot be written: ",

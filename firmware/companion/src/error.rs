@@ -1,12 +1,13 @@
 //! Why the program cannot run: what, where, what to do. Every error ends it with exit code 2.
 
 use crate::config::ConfigError;
+use crate::contract::SealError;
+use crate::keep::StateError;
+use crate::load::LoadError;
+use crate::logs::LogError;
 use crate::routing::SigningError;
-use crate::seal::SealError;
-use crate::text::TextFault;
 use gleaner_pilot::OnboardError;
-use gleaner_pilot::mission_file::MissionFileError;
-use gleaner_policy::onnx::{ConvertError, ModelError};
+use gleaner_policy::onnx::ConvertError;
 use gleaner_ports::PortError;
 use std::io;
 use std::path::PathBuf;
@@ -17,34 +18,15 @@ pub enum StartError {
     /// The configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// A file cannot be read.
-    #[error("{what} {}: cannot be read: {source}: correct the path, or the file's permissions", .path.display())]
-    Read {
-        /// Which kind of file.
-        what: &'static str,
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// A file is not text.
-    #[error("{what} {}: {source}", .path.display())]
-    Text {
-        /// Which kind of file.
-        what: &'static str,
-        /// Where.
-        path: PathBuf,
-        /// What.
-        source: TextFault,
-    },
-    /// The mission file is wrong.
-    #[error("mission {}: {source}", .path.display())]
-    Mission {
-        /// Where.
-        path: PathBuf,
-        /// What.
-        source: MissionFileError,
-    },
+    /// Model, mission or another file.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// A log cannot be written.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// The state folder cannot be used.
+    #[error(transparent)]
+    State(#[from] StateError),
     /// Mission and settings are good each, but not together.
     #[error("{}: {source}: correct it", .path.display())]
     Refused {
@@ -52,14 +34,6 @@ pub enum StartError {
         path: PathBuf,
         /// What.
         source: OnboardError,
-    },
-    /// The model may not fly.
-    #[error("model {}: {source}", .path.display())]
-    Model {
-        /// Where.
-        path: PathBuf,
-        /// What.
-        source: ModelError,
     },
     /// The model cannot be converted for the native engine.
     #[error("model {}: {source}", .path.display())]
@@ -85,14 +59,6 @@ pub enum StartError {
         /// Why.
         source: io::Error,
     },
-    /// A log cannot be written.
-    #[error("log {}: {source}: give another folder with --log, or correct its permissions", .path.display())]
-    Log {
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
     /// A port cannot sign.
     #[error("signing {}: {source}", .path.display())]
     Signing {
@@ -100,14 +66,6 @@ pub enum StartError {
         path: PathBuf,
         /// What.
         source: SigningError,
-    },
-    /// The state folder cannot be used.
-    #[error("state {}: {source}: give another folder with --state, or correct its permissions", .path.display())]
-    State {
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
     },
     /// The log holds no decision.
     #[error("decision log {}: holds no decision: give a decisions.jsonl of `gleaner run` or `gleaner-sitl`", .path.display())]

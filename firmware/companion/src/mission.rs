@@ -19,7 +19,7 @@ pub fn mission(order: &MissionCommand) -> Result<ExitCode, StartError> {
 }
 
 fn show(order: &MissionShow) -> Result<ExitCode, StartError> {
-    let mission = load::mission(&order.mission)?;
+    let mission = load::mission(&order.mission)?.mission;
     let name = order.mission.file_stem().unwrap_or_default().to_string_lossy();
     let scene = scene(&mission, order.altitude, name.into_owned());
     let (grid, fenced) = (mission.grid(), mission.fence.len());

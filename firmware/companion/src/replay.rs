@@ -6,7 +6,7 @@
 
 use crate::args::Replay;
 use crate::error::StartError;
-use crate::load;
+use crate::load::{self, LoadError};
 use gleaner_pilot::{LoggedDecision, LookAheadReplay, Replayed};
 use gleaner_policy::{Engine, Policy};
 use gleaner_units::Action;
@@ -22,7 +22,7 @@ const SHOWN: u64 = 10;
 /// # Errors
 /// The model or the log cannot be read, or the log holds no decision.
 pub fn replay(order: &Replay) -> Result<ExitCode, StartError> {
-    let unreadable = |source| StartError::Read { what: "decision log", path: order.log.clone(), source };
+    let unreadable = |source| LoadError::Read { what: "decision log", path: order.log.clone(), source };
     let log = BufReader::new(File::open(&order.log).map_err(unreadable)?);
     let engine = load::model(order.model.as_deref(), order.engine)?;
     println!(

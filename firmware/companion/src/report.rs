@@ -3,7 +3,7 @@
 use crate::args::Report;
 use crate::config;
 use crate::error::StartError;
-use crate::load;
+use crate::load::{self, LoadError};
 use gleaner_dashboard::{Recording, render, scene, telemetry_frames};
 use gleaner_link::{Address, Parameters};
 use gleaner_pilot::{LoggedDecision, Settings};
@@ -19,7 +19,7 @@ const AUTOPILOT: u8 = 1;
 /// # Errors
 /// The mission, the model or the log cannot be read, the log holds no decision, or the page cannot be written.
 pub fn report(order: &Report) -> Result<ExitCode, StartError> {
-    let mission = load::mission(&order.mission)?;
+    let mission = load::mission(&order.mission)?.mission;
     let engine = load::model(order.model.as_deref(), None)?;
     let (settings, parameters) = match &order.config {
         Some(path) => config::identity(path)?,
@@ -61,7 +61,7 @@ pub fn report(order: &Report) -> Result<ExitCode, StartError> {
 
 /// The decisions of the last run in the file. Lines that a full disk left unfinished are skipped.
 fn last_run(log: &Path) -> Result<Vec<LoggedDecision>, StartError> {
-    let unreadable = |source| StartError::Read { what: "decision log", path: log.to_owned(), source };
+    let unreadable = |source| LoadError::Read { what: "decision log", path: log.to_owned(), source };
     let bytes = fs::read(log).map_err(unreadable)?;
     let lines = bytes.split(|&byte| byte == b'\n');
     let all: Vec<LoggedDecision> = lines.filter_map(|line| serde_json::from_slice(line).ok()).collect();

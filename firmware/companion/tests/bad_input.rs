@@ -55,9 +55,9 @@ fn models() {
     let random: Vec<u8> = (0..5000u32).map(|at| (at.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     let cases: [(&str, &[u8], &[&str]); 6] = [
         ("empty", b"", &["copy the file again"]),
-        ("truncated", half, &["copy the file again"]),
-        ("garbage", &random, &["not an ONNX model", "copy the file again"]),
-        ("altered", &altered, &["copy the file again"]),
+        ("truncated", half, &["damaged, or not an ONNX model", "copy the file again"]),
+        ("garbage", &random, &["damaged, or not an ONNX model", "copy the file again"]),
+        ("altered", &altered, &["altered after sealing", "copy the file again"]),
         (
             "golden mismatch",
             &wrong_golden,

@@ -57,7 +57,7 @@ fn every_fault_is_printed() {
     for (start, end) in [
         ("ok    mission", "terminal (3, 2)"),
         ("FAIL  way home   20 battery units do not cover", "raise battery_units or lower GLN_RESERVE"),
-        ("FAIL  battery    the mission wants 20 units", "lower battery_units or correct GLN_BAT_UNITS"),
+        ("FAIL  battery    the mission takes 20 units", "lower battery_units or correct GLN_BAT_UNITS"),
         ("FAIL  altitude   30 m is not above the tallest building of 33 m", "raise GLN_ALT"),
         ("FAIL  model", "export the model again, or report this machine"),
         ("FAIL  autopilot", "or choose another number"),
@@ -151,7 +151,10 @@ fn many_devices_are_a_warning_and_too_many_a_fault() {
 fn a_terminal_on_a_roof_is_a_fault_and_a_device_a_warning() {
     let (code, stdout) = findings("terminal = [3, 2]", "terminal = [1, 1]");
     assert_eq!(code, Some(1), "{stdout}");
-    assert!(stdout.contains("FAIL  terminal   (1, 1) is on a building of 33 m"), "{stdout}");
+    assert!(stdout.contains("line 1: the terminal (1, 1) is on a building of 33 m"), "{stdout}");
+    let (code, stdout) = findings("terminal = [3, 2]", "terminal = [1, 1]\nterminal_height_m = 33");
+    assert_eq!(code, Some(0), "{stdout}");
+    assert!(stdout.contains("warn  terminal   (1, 1) is on a building of 33 m"), "{stdout}");
     let (code, stdout) = findings("cell = [2, 1]", "cell = [1, 1]");
     assert_eq!(code, Some(0), "{stdout}");
     assert!(stdout.contains("warn  device     device 1 at (1, 1) is on a building of 33 m"), "{stdout}");

@@ -26,11 +26,11 @@ fn it_is_a_component_of_the_vehicle_until_interrupted() {
     assert!(rest.contains("stopped after 0 decisions: setpoints and heartbeat have ended"), "{rest}");
     assert!(!rest.contains("panicked"), "{rest}");
     assert!(rest.contains("autopilot port udpin:127.0.0.1:0: "), "the traffic is printed: {rest}");
-    let goodbye = autopilot.drain(|_, message| match message {
+    let farewell = autopilot.drain(|_, message| match message {
         Message::StatusText { text, .. } if text.starts_with(b"gleaner: stopped") => Some(()),
         _ => None,
     });
-    assert!(goodbye.is_some(), "a status text said so");
+    assert!(farewell.is_some(), "the end is reported by a status text");
 }
 
 #[test]
@@ -62,6 +62,19 @@ fn every_decision_is_logged_whole() {
     assert_eq!(first["tokens"]["devices"], serde_json::json!([[20.0, 20.0, 6000.0, -34.0, 0.0, 20.0, 0.0]]));
     assert_eq!(first["slots"], serde_json::json!([0]));
     assert!(first["infer_us"].is_u64() && first["run_s"].is_u64() && first["time_us"].is_u64(), "{first}");
+}
+
+#[test]
+fn verbose_prints_one_line_for_each_decision() {
+    let fixture = Fixture::new();
+    let mut running = Running::start(fixture.gleaner("run").arg("-v"));
+    FakeAutopilot::find(&mut running).await_decision();
+    let (code, rest) = running.stop();
+    assert_eq!(code, Some(0), "{rest}");
+    let decisions =
+        rest.lines().filter(|line| line.contains(": hover at (1, 0), w 0.25, battery 20, spare "));
+    let logged = std::fs::read_to_string(fixture.path("log/decisions.jsonl")).unwrap();
+    assert_eq!(decisions.count(), logged.lines().count(), "{rest}");
 }
 
 #[test]

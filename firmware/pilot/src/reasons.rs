@@ -17,6 +17,8 @@ pub enum Missing {
     Home,
     /// The battery percentage is unknown.
     Battery,
+    /// Neither a byte nor a report of a radio has arrived.
+    Radio,
     /// The flight altitude, less the tolerance, does not clear the tallest building.
     SafeAltitude,
     /// The motors are not armed.
@@ -35,7 +37,7 @@ pub enum Missing {
 
 impl Missing {
     /// All of them, in the order of the checks.
-    pub const ALL: [Missing; 14] = [
+    pub const ALL: [Missing; 15] = [
         Missing::Autopilot,
         Missing::Permission,
         Missing::Origin,
@@ -43,6 +45,7 @@ impl Missing {
         Missing::Estimator,
         Missing::Home,
         Missing::Battery,
+        Missing::Radio,
         Missing::SafeAltitude,
         Missing::Armed,
         Missing::GuidedMode,
@@ -63,6 +66,7 @@ impl Missing {
             Missing::Origin => "no estimator origin",
             Missing::Home => "no home position",
             Missing::Battery => "no battery percentage",
+            Missing::Radio => "no byte from the radio",
             Missing::SafeAltitude => "GLN_ALT is below the buildings",
             Missing::Armed => "not armed",
             Missing::GuidedMode => "mode is not GUIDED/OFFBOARD",

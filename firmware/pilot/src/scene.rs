@@ -4,7 +4,7 @@ use crate::{Inputs, Mission, Vehicle};
 use gleaner_guard::Guard;
 use gleaner_link::Autopilot;
 use gleaner_policy::Preference;
-use gleaner_units::{Cell, Duration, GridFrame, Instant};
+use gleaner_units::{Cell, Duration, GridFrame, Instant, Metres};
 
 /// The facts of one poll.
 #[derive(Clone, Copy)]
@@ -49,6 +49,17 @@ impl<'a> Scene<'a> {
     /// The time that a move takes at `GLN_SPEED`, and that a hover lasts.
     pub(crate) fn slot(&self) -> Duration {
         Duration::from_secs_f32(self.mission.grid().cell().0 / self.inputs.parameters.speed().0)
+    }
+
+    /// How far the aircraft is outside the grid; `None` over the grid, and when origin or position is unknown.
+    pub(crate) fn outside_grid(&self) -> Option<Metres> {
+        let vehicle = self.vehicle();
+        let grid = self.mission.grid();
+        let point = GridFrame::new(grid, self.mission.pose, vehicle.origin?).point(&vehicle.position?);
+        let beyond = |at_m: f32, cells: u16| (-at_m).max(at_m - f32::from(cells) * grid.cell().0).max(0.0);
+        let (east_m, north_m) = (beyond(point.east_m, grid.width()), beyond(point.north_m, grid.height()));
+        let outside_m = libm::hypotf(east_m, north_m);
+        (outside_m > 0.0).then_some(Metres(outside_m))
     }
 
     /// The cell under the aircraft and its offset from the centre in metres, when both are known.

@@ -152,7 +152,7 @@ impl Port {
     }
 
     /// Sends one frame to the sender of the last datagram, whether or not it is a peer: the acknowledgement of a
-    /// protocol that wants one. On other ports the same as [`Port::send`].
+    /// protocol with answers. On other ports the same as [`Port::send`].
     pub fn reply(&mut self, frame: &[u8]) {
         let sent = self.transport.reply(frame);
         self.count(frame, sent);

@@ -9,7 +9,7 @@ use std::io;
 /// A port that could not be opened at the start: what, why, what to do.
 #[derive(Debug)]
 pub struct PortError {
-    /// The endpoint asked for.
+    /// The endpoint that could not be opened.
     pub endpoint: Endpoint,
     /// What failed.
     pub action: &'static str,

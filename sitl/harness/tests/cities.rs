@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn data(case: &str, file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(case).join(file)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/field").join(case).join(file)
 }
 
 fn city(case: &str) -> Result<CityFile, CityFileError> {
@@ -16,7 +16,9 @@ fn city(case: &str) -> Result<CityFile, CityFileError> {
 
 /// The error of a whole mission with the city of this case.
 fn mission_error(case: &str) -> String {
-    let text = std::fs::read_to_string(data(case, "mission.toml")).unwrap();
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../firmware/companion/dist/mission.toml");
+    let own = data(case, "mission.toml");
+    let text = std::fs::read_to_string(if own.exists() { own } else { example }).unwrap();
     let read = |name: &str| std::fs::read_to_string(data(case, name)).map_err(|error| error.to_string());
     mission_file::read(&text, read).unwrap_err().to_string()
 }
@@ -94,6 +96,39 @@ fn outlines_become_a_city_and_a_mission() {
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).map_err(|e| e.to_string());
     let mission = mission_file::read(&text, read).unwrap();
     assert_eq!((mission.devices[0].id, mission.devices.len()), (7, 1));
+}
+
+#[test]
+fn a_plan_gives_fence_and_terminal_and_roofs_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    // Semicolons, a byte order mark and CRLF, as spreadsheets write. The device is inside the first building.
+    std::fs::write(path("devices.csv"), "\u{feff}Lat;Lon;ID;Data\r\n-35.36285;149.16570;4000000000;5000\r\n")
+        .unwrap();
+    let plan = r#"{"fileType": "Plan", "geoFence": {"circles": [], "polygons": [{"inclusion": true, "polygon":
+        [[-35.3634, 149.1651], [-35.3634, 149.1679], [-35.3615, 149.1679], [-35.3615, 149.1651]]}]},
+        "rallyPoints": {"points": [[-35.3620, 149.1676, 50.0]]}}"#;
+    std::fs::write(path("field.plan"), plan).unwrap();
+    let footprints = data("01-geojson-osm", "city.geojson");
+    let mut words =
+        vec!["city", "import", footprints.to_str().unwrap(), "--bbox", "-35.3635,149.1650,-35.3610,149.1680"];
+    let (out, devices, plan, mission) =
+        (path("city.csv"), path("devices.csv"), path("field.plan"), path("mission.toml"));
+    words.extend(["--out", &out, "--devices", &devices, "--plan", &plan, "--mission-out", &mission]);
+    words.extend(["--rotation", "30", "--cell", "25"]);
+    let output = program(&words);
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(printed.contains("rotation 30.0 degrees") && printed.contains("cells of 25 m"), "{printed}");
+    let text = std::fs::read_to_string(&mission).unwrap();
+    let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).map_err(|e| e.to_string());
+    let mission = mission_file::read(&text, read).unwrap();
+    assert_eq!((mission.pose.rotation.0, mission.grid().cell()), (30.0, Metres(25.0)));
+    assert_eq!(mission.devices[0].id, 4_000_000_000);
+    assert!(mission.fence.len() > 20 && mission.fence.len() < mission.grid().len(), "the plan's fence");
+    let roof = "warning      device 4000000000 at ";
+    assert!(printed.contains(roof) && printed.contains("on a building of 18 m"), "{printed}");
+    assert_eq!(printed.matches("warning").count(), 1, "{printed}");
 }
 
 #[test]

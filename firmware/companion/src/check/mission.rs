@@ -1,6 +1,7 @@
 //! The mission against the guard, the battery, the buildings, and what the policy was trained for.
 
 use super::Findings;
+use crate::load::Loaded;
 use gleaner_guard::Guard;
 use gleaner_link::Parameters;
 use gleaner_pilot::Mission;
@@ -27,7 +28,9 @@ pub(super) fn describe(mission: &Mission) -> String {
     )
 }
 
-pub(super) fn check(findings: &mut Findings, mission: &Mission, parameters: &Parameters) {
+pub(super) fn check(findings: &mut Findings, loaded: &Loaded, parameters: &Parameters) {
+    let mission = &loaded.mission;
+    heights(findings, loaded);
     let guard = match mission.guard(parameters.reserve()) {
         Ok(guard) => guard,
         Err(error) => return findings.bad("way home", format!("{error}: correct the mission")),
@@ -37,6 +40,17 @@ pub(super) fn check(findings: &mut Findings, mission: &Mission, parameters: &Par
     altitude(findings, mission, parameters);
     roofs(findings, mission);
     training(findings, mission, parameters);
+}
+
+/// Heights with decimals are not a fault: surveys have them.
+fn heights(findings: &mut Findings, Loaded { mission, rounded }: &Loaded) {
+    if *rounded > 0 {
+        let cells = mission.grid().len();
+        findings.good(
+            "heights",
+            format!("{rounded} of {cells} had decimals and were rounded up to whole metres"),
+        );
+    }
 }
 
 fn way_home(findings: &mut Findings, mission: &Mission, parameters: &Parameters, guard: &Guard) {
@@ -71,7 +85,7 @@ fn way_home(findings: &mut Findings, mission: &Mission, parameters: &Parameters,
 fn battery(findings: &mut Findings, mission: &Mission, parameters: &Parameters) {
     let (budget, full) = (mission.budget, parameters.full_battery());
     if full.0 < budget.0 {
-        return findings.bad("battery", format!("the mission wants {} units, a full battery is {}: lower battery_units or correct GLN_BAT_UNITS", budget.0, full.0));
+        return findings.bad("battery", format!("the mission takes {} units, a full battery is {}: lower battery_units or correct GLN_BAT_UNITS", budget.0, full.0));
     }
     let used = percent(budget, full);
     let left = 100.0 - used;
@@ -107,17 +121,14 @@ fn altitude(findings: &mut Findings, mission: &Mission, parameters: &Parameters)
     }
 }
 
-/// The aircraft lands at the terminal.
+/// The mission file states the height where the terminal is on a building; without that it is refused.
 fn roofs(findings: &mut Findings, mission: &Mission) {
     let height = |cell| mission.heights.height(cell).map_or(0.0, |height| height.0);
     let roof = height(mission.terminal);
     if roof > 0.0 {
-        findings.bad(
+        findings.warn(
             "terminal",
-            format!(
-                "{} is on a building of {roof} m, where the aircraft would land: move the terminal",
-                mission.terminal
-            ),
+            format!("{} is on a building of {roof} m: the aircraft lands on its roof", mission.terminal),
         );
     }
     for device in mission.devices.iter().filter(|device| height(device.cell) > 0.0) {

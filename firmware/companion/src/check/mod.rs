@@ -8,9 +8,11 @@ use crate::config::{self, Config};
 use crate::error::StartError;
 use crate::load;
 use crate::logs::DecisionLog;
+use crate::radio::Radio;
 use crate::run::open;
 use gleaner_policy::{Engine, Policy};
 use gleaner_ports::Peers;
+use listen::Heard;
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
@@ -26,13 +28,17 @@ const TIMED_INFERENCES: usize = 201;
 pub fn check(setup: &Setup, wait_s: u64) -> Result<ExitCode, StartError> {
     let config = config::resolve(setup)?;
     let mut findings = Findings::default();
+    let mut devices = Vec::new();
     let file = setup.config.as_ref().map_or("flags only".into(), |path| path.display().to_string());
     findings.good("config", file);
-    if let Some(found) = findings.of("mission", load::mission(&config.mission), mission::describe) {
-        mission::check(&mut findings, &found, &config.parameters);
+    let loaded =
+        findings.of("mission", load::mission(&config.mission), |loaded| mission::describe(&loaded.mission));
+    if let Some(loaded) = loaded {
+        mission::check(&mut findings, &loaded, &config.parameters);
+        devices.extend(loaded.mission.devices.iter().map(|device| device.id));
     }
     check_model(&mut findings, &config);
-    let heard = check_ports(&mut findings, &config, wait_s);
+    let heard = check_ports(&mut findings, &config, &devices, wait_s);
     if let Some(folder) = &config.log_dir {
         let (news, _) = channel();
         let opened = DecisionLog::open(folder, 0, config.log_limits, news).map(DecisionLog::close);
@@ -43,9 +49,9 @@ pub fn check(setup: &Setup, wait_s: u64) -> Result<ExitCode, StartError> {
 
 /// Whether the autopilot was heard.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Heard {
-    Yes,
-    No,
+enum Verdict {
+    Heard,
+    Silent,
     NotListened,
 }
 
@@ -72,10 +78,10 @@ impl Findings {
     }
 
     /// Prints the outcome and returns the value, if there is one.
-    fn of<T>(
+    fn of<T, E: std::fmt::Display>(
         &mut self,
         what: &str,
-        outcome: Result<T, StartError>,
+        outcome: Result<T, E>,
         describe: impl FnOnce(&T) -> String,
     ) -> Option<T> {
         match &outcome {
@@ -85,7 +91,7 @@ impl Findings {
         outcome.ok()
     }
 
-    fn verdict(&self, heard: Heard) -> ExitCode {
+    fn verdict(&self, heard: Verdict) -> ExitCode {
         let count = |count: usize, what: &str| match count {
             1 => format!("1 {what}"),
             _ => format!("{count} {what}s"),
@@ -97,11 +103,11 @@ impl Findings {
             return ExitCode::FAILURE;
         }
         match heard {
-            Heard::Yes => println!("ready{warnings}"),
-            Heard::No => println!("ready, but no autopilot was heard{warnings}"),
-            Heard::NotListened => println!("ready, autopilot not listened for{warnings}"),
+            Verdict::Heard => println!("ready{warnings}"),
+            Verdict::Silent => println!("ready, but no autopilot was heard{warnings}"),
+            Verdict::NotListened => println!("ready, autopilot not listened for{warnings}"),
         }
-        if heard == Heard::No { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+        if heard == Verdict::Silent { ExitCode::FAILURE } else { ExitCode::SUCCESS }
     }
 }
 
@@ -139,25 +145,39 @@ fn check_engine(findings: &mut Findings, mut model: Engine) {
     }
 }
 
-fn check_ports(findings: &mut Findings, config: &Config, wait_s: u64) -> Heard {
-    if let Some(endpoint) = &config.radio {
-        findings.of("radio", open("radio", endpoint, Peers::All), |port| port.endpoint().to_string());
-    }
+/// Opens the ports and listens. `devices`: ids of the mission's devices.
+fn check_ports(findings: &mut Findings, config: &Config, devices: &[u32], wait_s: u64) -> Verdict {
+    let open_radio = |endpoint| {
+        let opened = Radio::open(endpoint, config.radio_format);
+        opened.map_err(|source| StartError::Port { role: "radio", source })
+    };
+    let mut radio = config.radio.as_ref().and_then(|endpoint| {
+        findings.of("radio", open_radio(endpoint), |radio| radio.port().endpoint().to_string())
+    });
     for endpoint in &config.ground {
         findings.of("ground", open("ground", endpoint, Peers::Bound), |port| port.endpoint().to_string());
     }
     let autopilot = open("autopilot", &config.autopilot, Peers::Bound);
     let link = findings.of("autopilot", autopilot, |port| port.endpoint().to_string());
-    let Some(mut link) = link.filter(|_| wait_s > 0) else { return Heard::NotListened };
-    let heard = listen::autopilot(&mut link, Duration::from_secs(wait_s));
-    match heard {
-        Ok(heard) => {
-            findings.good("heartbeat", heard);
-            Heard::Yes
+    let Some(mut link) = link.filter(|_| wait_s > 0) else { return Verdict::NotListened };
+    let heard = Heard::listen(&mut link, radio.as_mut(), Duration::from_secs(wait_s));
+    if let Some(radio) = &radio {
+        match heard.radio(radio, config.radio_format, devices) {
+            Ok(reports) => findings.good("reports", reports),
+            Err(fault) => findings.warn("reports", fault),
+        }
+    }
+    if let Some(advice) = heard.no_station().filter(|_| config.ground.is_empty()) {
+        findings.warn("station", advice);
+    }
+    match heard.autopilot(&link) {
+        Ok(name) => {
+            findings.good("heartbeat", name);
+            Verdict::Heard
         }
         Err(silence) => {
             findings.warn("heartbeat", format!("{silence} in {wait_s} s"));
-            Heard::No
+            Verdict::Silent
         }
     }
 }

@@ -1,7 +1,7 @@
 //! `parameters.toml`: the parameters that a ground station has set, kept for the next run.
 
+use super::StateError;
 use super::atomic::Replacer;
-use crate::error::StartError;
 use gleaner_link::{PARAMETERS, ParameterId, Parameters};
 use std::collections::BTreeMap;
 use std::fs;
@@ -39,9 +39,9 @@ impl ParameterFile {
     pub fn open(
         folder: &Path,
         configured: &Parameters,
-    ) -> Result<(ParameterFile, Parameters, Vec<String>), StartError> {
+    ) -> Result<(ParameterFile, Parameters, Vec<String>), StateError> {
         let path = folder.join("parameters.toml");
-        let fail = |source| StartError::State { path: path.clone(), source };
+        let fail = |source| StateError { path: path.clone(), source };
         fs::create_dir_all(folder).map_err(fail)?;
         let text = match fs::read_to_string(&path) {
             Ok(text) => text,
@@ -64,12 +64,10 @@ impl ParameterFile {
     ///
     /// # Errors
     /// It is there and cannot be removed.
-    pub fn reset(folder: &Path) -> Result<(), StartError> {
+    pub fn reset(folder: &Path) -> Result<(), StateError> {
         let path = folder.join("parameters.toml");
         match fs::remove_file(&path) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                Err(StartError::State { path, source })
-            }
+            Err(source) if source.kind() != io::ErrorKind::NotFound => Err(StateError { path, source }),
             _ => Ok(()),
         }
     }

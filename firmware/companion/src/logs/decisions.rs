@@ -1,8 +1,8 @@
 //! The decision log: `decisions.jsonl`, one JSON object a line.
 
+use super::LogError;
 use super::rotation::{Limits, RotatingFile};
 use super::writer::{LogWriter, NewsSender};
-use crate::error::StartError;
 use gleaner_pilot::{Decision, LoggedDecision, LoggedLookAhead};
 use gleaner_units::{Duration, Ned};
 use std::path::Path;
@@ -24,9 +24,9 @@ impl DecisionLog {
         run_s: u64,
         limits: Limits,
         news: NewsSender,
-    ) -> Result<DecisionLog, StartError> {
+    ) -> Result<DecisionLog, LogError> {
         let file = RotatingFile::open(folder, "decisions", "jsonl", limits, false)
-            .map_err(|source| StartError::Log { path: folder.join("decisions.jsonl"), source })?;
+            .map_err(|source| LogError { path: folder.join("decisions.jsonl"), source })?;
         Ok(DecisionLog { run_s, writer: LogWriter::start("decision log", file, b"\n", news) })
     }
 

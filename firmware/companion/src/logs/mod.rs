@@ -9,3 +9,16 @@ pub use decisions::DecisionLog;
 pub use rotation::Limits;
 pub use telemetry::TelemetryLog;
 pub use writer::LogNews;
+
+use std::io;
+use std::path::PathBuf;
+
+/// A log cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("log {}: {source}: give another folder with --log, or correct its permissions", .path.display())]
+pub struct LogError {
+    /// Which file.
+    path: PathBuf,
+    /// Why.
+    source: io::Error,
+}

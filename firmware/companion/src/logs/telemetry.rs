@@ -1,9 +1,9 @@
 //! The telemetry log: `flight.tlog`, every MAVLink packet of the run, as ground stations, pymavlink and MAVExplorer read
 //! it.
 
+use super::LogError;
 use super::rotation::{Limits, RotatingFile};
 use super::writer::{LogWriter, NewsSender};
-use crate::error::StartError;
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -17,9 +17,9 @@ impl TelemetryLog {
     ///
     /// # Errors
     /// The folder cannot be made, or the file cannot be opened.
-    pub fn open(folder: &Path, limits: Limits, news: NewsSender) -> Result<TelemetryLog, StartError> {
+    pub fn open(folder: &Path, limits: Limits, news: NewsSender) -> Result<TelemetryLog, LogError> {
         let file = RotatingFile::open(folder, "flight", "tlog", limits, true)
-            .map_err(|source| StartError::Log { path: folder.join("flight.tlog"), source })?;
+            .map_err(|source| LogError { path: folder.join("flight.tlog"), source })?;
         Ok(TelemetryLog { writer: LogWriter::start("telemetry log", file, b"", news) })
     }
 

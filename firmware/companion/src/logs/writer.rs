@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 /// Records that wait for a slow disk: minutes of decisions, seconds of telemetry.
 const RECORDS_WAITING: usize = 1024;
 
-/// A change that the operator is told. The flight goes on in every case.
+/// A change that is reported to the operator. The flight goes on in every case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LogNews {
     /// Records are lost because the disk is full or broken; the text says why.
@@ -53,7 +53,7 @@ impl LogWriter {
             Ok(()) => self.overflowed = false,
             Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => {
                 if !std::mem::replace(&mut self.overflowed, true) {
-                    // At the end of the run no one receives it any more.
+                    // At the end of the run the receiver is gone.
                     let _ = self.news.send(LogNews::Slow(self.name));
                 }
             }
@@ -110,7 +110,7 @@ impl Recovery {
                 LogNews::Failing(self.name, error.to_string())
             }
         };
-        // At the end of the run no one receives it any more.
+        // At the end of the run the receiver is gone.
         let _ = news.send(report);
     }
 }

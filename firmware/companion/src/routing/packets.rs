@@ -133,7 +133,7 @@ fn front(held: &[u8]) -> Front {
             return Front::Damaged;
         }
     } else if version == MavlinkVersion::V1 || held.get(whole).is_some_and(|&next| !is_magic(next)) {
-        // The length of an unknown message is believed only where another packet or nothing follows it.
+        // The length of an unknown message is used only where another packet or nothing follows it.
         return Front::Garbage;
     }
     let target = if verified { target(version, message_id, &bytes[header..checked]) } else { None };

@@ -1,4 +1,4 @@
-//! What the console shows: everything that a ground station is told, and what only this program knows.
+//! What the console shows: every status text that a ground station gets, and the messages of this program.
 
 use crate::routing::Packet;
 use gleaner_link::{Address, Component};
@@ -50,7 +50,7 @@ impl Console {
         }
     }
 
-    /// A packet of someone else: the vehicle that is served is introduced at its first heartbeat.
+    /// A packet of another component. The vehicle is introduced at its first heartbeat.
     pub fn received(&mut self, packet: &Packet, link: &Component) {
         let Some(autopilot) = link.autopilot().address() else { return };
         if packet.message_id != HEARTBEAT || packet.sender != (autopilot.system, autopilot.component) {

@@ -5,11 +5,11 @@
 
 use super::console::Console;
 use super::page::Page;
-use super::radio::RadioDecoder;
 use super::service::Service;
 use super::{Kept, Logs, unix_time_s};
 use crate::clock;
 use crate::logs::LogNews;
+use crate::radio::{Radio, describe};
 use crate::routing::Links;
 use gleaner_link::{MAX_FRAME_BYTES, Severity};
 use gleaner_pilot::{LookingAhead, Onboard, POLL_INTERVAL};
@@ -29,7 +29,7 @@ const DRAIN_TURNS: usize = 256;
 /// Time to give the aircraft back when the program is asked to end.
 const HAND_BACK: Duration = Duration::from_secs(3);
 /// Time for the last messages: status texts leave at ten a second.
-const GOODBYE: Duration = Duration::from_millis(300);
+const LAST_TEXTS: Duration = Duration::from_millis(300);
 /// Time between two reports of the traffic.
 const TRAFFIC_PERIOD: Duration = Duration::from_secs(10);
 
@@ -37,8 +37,7 @@ const TRAFFIC_PERIOD: Duration = Duration::from_secs(10);
 pub struct Flight {
     onboard: Onboard<LookingAhead<Timed<Engine>>>,
     links: Links,
-    radio: Option<Port>,
-    radio_decoder: RadioDecoder,
+    radio: Option<Radio>,
     logs: Logs,
     kept: Option<Kept>,
     console: Console,
@@ -54,7 +53,7 @@ impl Flight {
     pub fn new(
         onboard: Onboard<LookingAhead<Timed<Engine>>>,
         links: Links,
-        (radio, radio_decoder): (Option<Port>, RadioDecoder),
+        radio: Option<Radio>,
         logs: Logs,
         kept: Option<Kept>,
         (console, page): (Console, Page),
@@ -66,7 +65,6 @@ impl Flight {
             onboard,
             links,
             radio,
-            radio_decoder,
             logs,
             kept,
             console,
@@ -75,13 +73,13 @@ impl Flight {
             polled_at: now,
             traffic_at: now,
         };
-        flight.confess();
+        flight.report_last_run();
         flight.service.ready();
         flight
     }
 
     /// Reports a last run that did not end as asked.
-    fn confess(&mut self) {
+    fn report_last_run(&mut self) {
         let Some(last) = self.kept.as_mut().and_then(|kept| kept.last_run.take()) else { return };
         if let Some(panic) = last.panic() {
             tracing::error!("the last run ended with {panic}");
@@ -115,7 +113,7 @@ impl Flight {
 
     /// Reads each port; whether bytes may be left.
     fn receive_turn(&mut self) -> bool {
-        let Flight { onboard, links, logs, console, radio, radio_decoder, .. } = self;
+        let Flight { onboard, links, logs, console, radio, .. } = self;
         let mut more = links.receive(Instant::now(), READS_PER_TURN, |_, packet| {
             onboard.receive_link(clock::now(), &packet.bytes);
             console.received(packet, onboard.link());
@@ -126,12 +124,13 @@ impl Flight {
         let Some(radio) = radio else { return more };
         let mut buffer = [0; RECEIVE_BYTES];
         for read in 1..=READS_PER_TURN {
-            let bytes = radio.receive(&mut buffer);
-            if bytes == 0 {
+            let now = clock::now();
+            let bytes = radio.receive(&mut buffer, |report| onboard.receive_report(now, &report));
+            if bytes.is_empty() {
                 break;
             }
+            onboard.observe_radio(bytes);
             more |= read == READS_PER_TURN;
-            radio_decoder.receive(&buffer[..bytes], onboard, radio);
         }
         more
     }
@@ -211,17 +210,20 @@ impl Flight {
         if let Some(radio) = radio
             && let Some(state) = radio.maintain(now)
         {
-            report("radio", radio, state);
+            report("radio", radio.port(), state);
         }
         if now.saturating_duration_since(self.traffic_at) >= TRAFFIC_PERIOD {
             self.traffic_at = now;
-            for line in self.links.summary() {
+            for line in self.links.summary().chain(self.radio.as_ref().map(summary)) {
                 tracing::debug!("{line}");
+            }
+            if let Some(faults) = self.radio.as_mut().and_then(Radio::new_faults) {
+                tracing::warn!("radio: {faults}");
             }
         }
     }
 
-    /// The flight goes on without a log; the operator is told.
+    /// The flight goes on without a log; the operator gets a text.
     fn report_logs(&mut self) {
         while let Ok(news) = self.logs.news.try_recv() {
             match news {
@@ -261,23 +263,23 @@ impl Flight {
     }
 
     fn rest(&self, at_most: Duration) {
-        let ports: Vec<&Port> = self.links.ports().map(|(_, port)| port).chain(self.radio.as_ref()).collect();
+        let ports: Vec<&Port> =
+            self.links.ports().map(|(_, port)| port).chain(self.radio.as_ref().map(Radio::port)).collect();
         if wait(&ports, at_most).is_err() {
             // Without the system's help the ports are read once a tick.
             std::thread::sleep(at_most);
         }
     }
 
-    /// Gives the aircraft back and says goodbye. Nothing is sent after that: the autopilot and the ground station see the
-    /// silence.
+    /// Gives the aircraft back and sends the last texts. Nothing is sent after that: heartbeat and targets have ended.
     pub fn end(mut self) {
         self.service.stopping();
         if self.onboard.state().flies() {
             self.onboard.say(Severity::Critical, format_args!("gleaner: stopped in flight, take over now"));
             tracing::warn!("stopped in flight: requesting the autopilot to return");
             self.onboard.hand_back();
-            let patience = Instant::now() + HAND_BACK;
-            while self.onboard.is_handing_back() && Instant::now() < patience {
+            let deadline = Instant::now() + HAND_BACK;
+            while self.onboard.is_handing_back() && Instant::now() < deadline {
                 let tick = Instant::now() + TICK;
                 self.fly(|| Instant::now() >= tick);
             }
@@ -287,11 +289,11 @@ impl Flight {
         } else {
             self.onboard.say(Severity::Warning, format_args!("gleaner: stopped"));
         }
-        let end = Instant::now() + GOODBYE;
+        let end = Instant::now() + LAST_TEXTS;
         self.fly(|| Instant::now() >= end);
         let decisions = self.onboard.stats().decisions;
         tracing::info!("stopped after {decisions} decisions: setpoints and heartbeat have ended");
-        for line in self.links.summary() {
+        for line in self.links.summary().chain(self.radio.as_ref().map(summary)) {
             tracing::info!("{line}");
         }
         if self.links.loops() > 0 {
@@ -311,3 +313,8 @@ impl Flight {
 
 /// An older position is not logged.
 const MAX_POSITION_AGE: gleaner_units::Duration = gleaner_units::Duration::from_millis(2_000);
+
+/// One line of counters for the radio's port.
+fn summary(radio: &Radio) -> String {
+    format!("radio port {}: {}", radio.port().endpoint(), describe(&radio.stats()))
+}

@@ -3,7 +3,6 @@
 mod console;
 mod flight;
 mod page;
-mod radio;
 mod service;
 
 use crate::args::{self, Setup};
@@ -13,6 +12,7 @@ use crate::error::StartError;
 use crate::keep::{LastRun, LastRunFile, ParameterFile};
 use crate::load;
 use crate::logs::{DecisionLog, LogNews, TelemetryLog};
+use crate::radio::Radio;
 use crate::routing::{Links, SignedPort, read_key};
 use console::Console;
 use flight::Flight;
@@ -21,7 +21,6 @@ use gleaner_pilot::{Budget, LookingAhead, Onboard};
 use gleaner_policy::Timed;
 use gleaner_ports::{Endpoint, Peers, Port};
 use page::Page;
-use radio::RadioDecoder;
 use service::Service;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
@@ -34,7 +33,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Something could not be opened; nothing was sent then.
 pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let config = config::resolve(&order.setup)?;
-    let mission = load::mission(&config.mission)?;
+    let load::Loaded { mission, rounded } = load::mission(&config.mission)?;
     let engine = load::model(config.model.as_deref(), config.engine)?;
     let model = format!("{}, engine {engine}", engine.name());
     let (kept, parameters, lines) = Kept::open(&config, order.reset_parameters)?;
@@ -45,28 +44,27 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
         .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
     let logs = Logs::open(&config)?;
     let links = open_links(&config)?;
-    let radio = config.radio.as_ref().map(|endpoint| open("radio", endpoint, Peers::All)).transpose()?;
+    let open_radio = |endpoint| {
+        let opened = Radio::open(endpoint, config.radio_format);
+        opened.map_err(|source| StartError::Port { role: "radio", source })
+    };
+    let radio = config.radio.as_ref().map(open_radio).transpose()?;
     let stop = gleaner_ports::end_requested().map_err(StartError::Signals)?;
     let console = Console::start(order.verbose);
-    introduce(&config, &order.setup, &model, &links, radio.as_ref());
+    introduce(&config, &order.setup, &model, &links, radio.as_ref().map(Radio::port));
     for line in page.introduction(config.page_tokens.is_some()) {
         tracing::info!("{line}");
     }
     for line in &lines {
         tracing::info!("{line}");
     }
+    if rounded > 0 {
+        tracing::info!("{rounded} building heights had decimals and were rounded up to whole metres");
+    }
     for refused in service::become_real_time() {
         tracing::info!("not real time: {refused}");
     }
-    let mut flight = Flight::new(
-        onboard,
-        links,
-        (radio, RadioDecoder::new(config.radio_format)),
-        logs,
-        kept,
-        (console, page),
-        Service::new(),
-    );
+    let mut flight = Flight::new(onboard, links, radio, logs, kept, (console, page), Service::new());
     flight.fly(|| stop.load(Ordering::Relaxed));
     flight.end();
     Ok(ExitCode::SUCCESS)

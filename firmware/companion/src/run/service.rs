@@ -1,4 +1,4 @@
-//! The process as a service: memory, priority, and what systemd is told.
+//! The process as a service: memory, priority, and the messages to systemd.
 
 use rustix::mm::{MlockAllFlags, mlockall};
 use sd_notify::NotifyState;
@@ -76,6 +76,6 @@ impl Service {
 }
 
 fn notify(state: &NotifyState<'_>) {
-    // Without systemd there is no socket. A full one means that systemd is late; the next message tells it the same.
+    // Without systemd there is no socket. A full one means that systemd is late; the next message is the same.
     let _ = sd_notify::notify(std::slice::from_ref(state));
 }

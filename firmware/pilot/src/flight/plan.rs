@@ -1,6 +1,7 @@
 //! Everything that must hold before the mission is engaged.
 
 use crate::Missing;
+use crate::RadioActivity;
 use crate::flight::energy::Energy;
 use crate::scene::Scene;
 use gleaner_units::{BatteryUnits, Cell, GeoPoint, GridFrame, Instant, Ned};
@@ -37,6 +38,9 @@ pub(crate) fn check(scene: &Scene<'_>, energy: &Energy, requested_at: Instant) -
     }
     let home_down_m = vehicle.home_down_m.ok_or(Missing::Home)?;
     let percent = vehicle.battery_percent.ok_or(Missing::Battery)?;
+    if scene.inputs.radio == RadioActivity::default() {
+        return Err(Missing::Radio);
+    }
     let altitude = parameters.altitude();
     if altitude.0 - ALTITUDE_TOLERANCE_M < scene.mission.heights.tallest().0 {
         return Err(Missing::SafeAltitude);

@@ -2,6 +2,7 @@
 //!
 //! ```toml
 //! terminal = [30, 18]             # cell x (east), y (north): the mission ends and lands here
+//! terminal_height_m = 0.0         # needed where the terminal is on a building: its height in the city
 //! battery_units = 80.0            # the most that the mission may use; one unit is one move
 //!
 //! [grid]
@@ -21,13 +22,17 @@
 //! data = 6000.0                   # data units at the start
 //! ```
 
+mod output;
+mod place;
+
+pub use output::write;
+
 use crate::{DeviceSite, Mission, MissionError};
 use gleaner_guard::GuardError;
 use gleaner_units::city_file::{CityFileError, read_city};
-use gleaner_units::{
-    BatteryUnits, Cell, CellSet, Degrees, GeoPoint, GridFrame, GridPose, HeightMap, Metres, Ned,
-};
-use serde::{Deserialize, Serialize};
+use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, GridPose, HeightMap, Metres};
+use place::{cell_at, degrees_e7, roof_m};
+use serde::Deserialize;
 use std::format;
 use std::string::String;
 use std::vec::Vec;
@@ -76,6 +81,7 @@ pub enum MissionFileError {
 #[serde(deny_unknown_fields)]
 struct File {
     terminal: Spanned<[i16; 2]>,
+    terminal_height_m: Option<Spanned<f32>>,
     battery_units: Spanned<f32>,
     grid: GridTable,
     fence: Option<FenceTable>,
@@ -152,9 +158,13 @@ pub fn read(
     text: &str,
     city: impl FnOnce(&str) -> Result<String, String>,
 ) -> Result<Mission, MissionFileError> {
-    let file: File = toml::from_str(text).map_err(|error| MissionFileError::Syntax {
-        line: error.span().map_or(1, |span| line_of(text, span.start)),
-        message: error.message().replace('\n', " "),
+    let file: File = toml::from_str(text).map_err(|error| {
+        let line = error.span().map_or(1, |span| line_of(text, span.start));
+        let mut message = error.message().replace('\n', " ");
+        if text.lines().nth(line - 1).is_some_and(has_decimal_comma) {
+            message = "a decimal comma: write a point".into();
+        }
+        MissionFileError::Syntax { line, message }
     })?;
     Reader { text }.mission(file, city)
 }
@@ -215,7 +225,31 @@ impl Reader<'_> {
             MissionError::Budget => self.fault(&file.battery_units, format!("{error}: give one")),
             _ => self.fault(&file.terminal, format!("{error}: move the terminal or widen the fence")),
         })?;
+        self.landing(&file, &mission)?;
         Ok(mission)
+    }
+
+    /// The aircraft lands at the terminal. On a building it does so only if the mission states the height.
+    fn landing(&self, file: &File, mission: &Mission) -> Result<(), MissionFileError> {
+        let roof_m = roof_m(mission);
+        match &file.terminal_height_m {
+            None if roof_m > 0.0 => Err(self.fault(
+                &file.terminal,
+                format!(
+                    "the terminal {} is on a building of {roof_m} m, where the aircraft would land: move it, or write terminal_height_m = {roof_m}",
+                    mission.terminal
+                ),
+            )),
+            Some(stated) if *stated.get_ref() != roof_m => Err(self.fault(
+                stated,
+                format!(
+                    "terminal_height_m = {}, but the city has {roof_m} m at {}: correct one of them",
+                    stated.get_ref(),
+                    mission.terminal
+                ),
+            )),
+            _ => Ok(()),
+        }
     }
 
     fn heights(
@@ -292,14 +326,8 @@ impl Reader<'_> {
         let &DeviceTable { cell: at, lat_deg, lon_deg, data, .. } = entry.get_ref();
         let at = match (at, lat_deg, lon_deg) {
             (Some(at), None, None) => cell(at),
-            (None, Some(lat_deg), Some(lon_deg)) => {
-                let point = degrees_e7(lat_deg, 90.0).zip(degrees_e7(lon_deg, 180.0));
-                let (lat_deg_e7, lon_deg_e7) = point.ok_or_else(|| {
-                    self.fault(entry, format!("device {id}: lat_deg, lon_deg are no place"))
-                })?;
-                cell_under(mission, GeoPoint { lat_deg_e7, lon_deg_e7 })
-                    .ok_or_else(|| self.fault(entry, format!("device {id} stands outside the city")))?
-            }
+            (None, Some(lat_deg), Some(lon_deg)) => cell_at(mission, lat_deg, lon_deg)
+                .map_err(|what| self.fault(entry, format!("device {id}: {what}")))?,
             _ => {
                 return Err(self
                     .fault(entry, format!("device {id}: give either cell = [x, y] or lat_deg and lon_deg")));
@@ -313,82 +341,15 @@ fn cell([x, y]: [i16; 2]) -> Cell {
     Cell::new(x, y)
 }
 
-fn cell_under(mission: &Mission, point: GeoPoint) -> Option<Cell> {
-    let (north, east) = mission.pose.corner.offset_to(&point);
-    let position = Ned { north_m: north.0, east_m: east.0, down_m: 0.0 };
-    GridFrame::new(mission.grid(), mission.pose, mission.pose.corner).cell(&position)
-}
-
-fn degrees_e7(degrees: f64, limit: f64) -> Option<i32> {
-    // Written so that NaN is refused.
-    (degrees >= -limit && degrees <= limit).then(|| (degrees * 1e7).round() as i32)
-}
-
 fn line_of(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|&byte| byte == b'\n').count()
 }
 
-#[derive(Serialize)]
-struct FileOut<'m> {
-    terminal: [i16; 2],
-    battery_units: f32,
-    grid: GridOut<'m>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    fence: Option<FenceOut>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    device: Vec<DeviceOut>,
-}
-
-#[derive(Serialize)]
-struct GridOut<'m> {
-    corner_lat_deg: f64,
-    corner_lon_deg: f64,
-    #[serde(skip_serializing_if = "is_zero")]
-    rotation_deg: f32,
-    cell_m: f32,
-    heights: &'m str,
-}
-
-// The signature that serde requires.
-fn is_zero(number: &f32) -> bool {
-    *number == 0.0
-}
-
-#[derive(Serialize)]
-struct FenceOut {
-    excluded: Vec<[i16; 2]>,
-}
-
-#[derive(Serialize)]
-struct DeviceOut {
-    id: u32,
-    cell: [i16; 2],
-    data: f32,
-}
-
-/// Writes a mission file that [`read`] turns back into the same mission, given the city under `heights`.
-#[must_use]
-pub fn write(mission: &Mission, heights: &str) -> String {
-    let pair = |cell: Cell| [cell.x, cell.y];
-    let excluded: Vec<[i16; 2]> =
-        mission.grid().cells().filter(|&cell| !mission.fence.contains(cell)).map(pair).collect();
-    let file = FileOut {
-        terminal: pair(mission.terminal),
-        battery_units: mission.budget.0,
-        grid: GridOut {
-            corner_lat_deg: f64::from(mission.pose.corner.lat_deg_e7) / 1e7,
-            corner_lon_deg: f64::from(mission.pose.corner.lon_deg_e7) / 1e7,
-            rotation_deg: mission.pose.rotation.0,
-            cell_m: mission.grid().cell().0,
-            heights,
-        },
-        fence: (!excluded.is_empty()).then_some(FenceOut { excluded }),
-        device: mission
-            .devices
-            .iter()
-            .map(|site| DeviceOut { id: site.id, cell: pair(site.cell), data: site.data })
-            .collect(),
-    };
-    // Only maps with unrepresentable keys fail to serialise; there are none here.
-    toml::to_string(&file).unwrap_or_default()
+/// `key = 12,5`: digits around a comma, outside of brackets and quotes.
+fn has_decimal_comma(line: &str) -> bool {
+    let Some((_, value)) = line.split_once('=') else { return false };
+    let Some((whole, rest)) = value.split_once(',') else { return false };
+    let whole = whole.trim().trim_start_matches(['-', '+']);
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    is_digits(whole) && rest.starts_with(|next: char| next.is_ascii_digit())
 }

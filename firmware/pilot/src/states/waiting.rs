@@ -112,6 +112,14 @@ impl Wait {
         self.reported = Some((scene.now, missing));
         let needed = scene.cell_under().and_then(|(cell, _)| scene.guard.way_home(cell));
         let offered = scene.vehicle().battery_percent.map(|percent| energy.offered(scene, percent));
+        let outside = scene.outside_grid().filter(|_| missing == Missing::InsideFence);
+        if let Some(outside) = outside {
+            let (length, unit) =
+                if outside.0 >= 1000.0 { (outside.0 / 1000.0, "km") } else { (outside.0, "m") };
+            let length = Decimal::<0>(length);
+            return out
+                .say(Severity::Info, format_args!("gleaner: waiting: {length} {unit} outside the grid"));
+        }
         match (missing, needed, offered) {
             (Missing::EnoughBattery, Some(way), Some(offered)) => {
                 let needed = way + scene.guard.reserve();

@@ -39,8 +39,10 @@ impl Bench {
     pub fn new(self_test: Result<(), SelfTestError>) -> Bench {
         let mut parameters = Parameters::default();
         parameters.set("GLN_ENABLE", 1.0).unwrap();
-        let onboard =
+        let mut onboard =
             Onboard::new(mission(), parameters, Settings::default(), hovering(), self_test).unwrap();
+        // An empty frame: the radio is there, and hears no device yet.
+        onboard.receive_radio(Instant::ZERO, &[0]);
         let position = Bench::centre(START);
         Bench {
             onboard,

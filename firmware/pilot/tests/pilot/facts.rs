@@ -187,6 +187,8 @@ fn a_flight_without_reports_ends_after_the_set_time() {
     mission.budget = BatteryUnits(70.0);
     let mut rig = Rig::with(mission, true);
     rig.radio_reports = false;
+    // The radio is there, and hears no device.
+    rig.radio.bytes = 1;
     rig.engage();
     rig.run(61.0);
     assert_eq!(rig.machine.return_reason(), Some(ReturnReason::RadioSilent));

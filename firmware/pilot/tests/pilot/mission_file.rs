@@ -30,7 +30,7 @@ data = 100.0
 
 fn city(path: &str) -> Result<String, String> {
     assert_eq!(path, "city.csv");
-    Ok("0,10,20,30\n1,2,3,4\n".into())
+    Ok("0,10,0,30\n1,2,3,4\n".into())
 }
 
 fn fails(text: &str) -> String {
@@ -140,4 +140,52 @@ fn without_a_fence_all_of_the_grid_may_be_flown_over() {
     assert_eq!(read(&text, city).unwrap().fence.len(), 8);
     let rectangle = TEXT.replace("excluded = [[3, 0]]", "allowed = [[1, 0], [2, 1]]");
     assert_eq!(read(&rectangle, city).unwrap().fence.len(), 4);
+}
+
+#[test]
+fn a_terminal_on_a_building_needs_its_height_stated() {
+    let roof = TEXT.replace("[2, 1]", "[1, 1]");
+    assert_eq!(
+        fails(&roof),
+        "line 1: the terminal (1, 1) is on a building of 10 m, where the aircraft would land: move it, or write terminal_height_m = 10"
+    );
+    let stated = |height: &str| format!("terminal_height_m = {height}\n{roof}");
+    let mission = read(&stated("10"), city).unwrap();
+    assert_eq!(read(&write(&mission, "city.csv"), city).unwrap(), mission);
+    assert_eq!(
+        fails(&stated("12.0")),
+        "line 1: terminal_height_m = 12, but the city has 10 m at (1, 1): correct one of them"
+    );
+    assert!(read(&format!("terminal_height_m = 0.0\n{TEXT}"), city).is_ok());
+}
+
+#[test]
+fn a_place_outside_the_city_gets_distance_and_likely_cause() {
+    let place = |lat: &str, lon: &str| {
+        let text = TEXT.replace(
+            "lat_deg = -35.36317\nlon_deg = 149.16568",
+            &format!("lat_deg = {lat}\nlon_deg = {lon}"),
+        );
+        fails(&text)
+    };
+    for (lat, lon, expected) in [
+        ("149.16568", "-35.36317", "lat_deg = 149.16568, lon_deg = -35.36317 are no place: they are swapped"),
+        (
+            "35.36317",
+            "149.16568",
+            "stands outside the city, 7864 km from its corner: lat_deg has the wrong sign",
+        ),
+        ("-35.36317", "-149.16568", "km from its corner: lon_deg has the wrong sign"),
+        ("35.36317", "-149.16568", "km from its corner: both have the wrong sign"),
+        (
+            "-36.36317",
+            "149.16568",
+            "111 km from its corner: correct lat_deg and lon_deg, or the grid's corner",
+        ),
+        ("-35.3642621", "149.16568", "118 m from its corner: move it, or enlarge the city"),
+        ("-35,36317", "149.16568", "line 20: a decimal comma: write a point"),
+    ] {
+        let error = place(lat, lon);
+        assert!(error.ends_with(expected), "{error}");
+    }
 }

@@ -85,7 +85,7 @@ pub struct Rig {
     pub rules: Rules,
     /// Whether the radio reports anything.
     pub radio_reports: bool,
-    radio: RadioActivity,
+    pub radio: RadioActivity,
     pub policy: Scripted,
     /// Decides in place of `policy`, if it is there.
     pub ahead: Option<LookingAhead<Scripted>>,

@@ -1,9 +1,9 @@
 //! From boot to engaged: what holds a start back, and the states that fly nothing.
 
-use crate::rig::{Rig, mission};
+use crate::rig::{CORNER, HOME_DOWN_M, Rig, mission};
 use gleaner_link::{Firmware, FlightMode, SystemState};
 use gleaner_pilot::{Fault, Missing, Request, State, Vehicle};
-use gleaner_units::{Action, BatteryUnits, Cell, Ned};
+use gleaner_units::{Action, BatteryUnits, Cell, GeoPoint, Metres, Ned};
 
 use Action::North;
 
@@ -37,7 +37,7 @@ fn a_failed_self_test_refuses_every_request_for_good() {
 #[test]
 fn each_missing_condition_holds_the_start_back_and_is_told_once() {
     type Spoil = fn(&mut Rig);
-    let cases: [(Missing, Spoil); 14] = [
+    let cases: [(Missing, Spoil); 15] = [
         (Missing::Permission, |rig| rig.engage_inhibited = true),
         (Missing::Autopilot, |rig| rig.vehicle.mode = None),
         (Missing::Heartbeat, |rig| rig.beats = false),
@@ -47,6 +47,7 @@ fn each_missing_condition_holds_the_start_back_and_is_told_once() {
         (Missing::Estimator, |rig| rig.vehicle.ready = false),
         (Missing::Home, |rig| rig.vehicle.home_down_m = None),
         (Missing::Battery, |rig| rig.vehicle.battery_percent = None),
+        (Missing::Radio, |rig| rig.radio_reports = false),
         (Missing::Armed, |rig| rig.vehicle.armed = false),
         (Missing::GuidedMode, |rig| rig.vehicle.mode = Some(FlightMode::Hold)),
         (Missing::Altitude, |rig| rig.set("GLN_ALT", 64.0)),
@@ -62,6 +63,24 @@ fn each_missing_condition_holds_the_start_back_and_is_told_once() {
         let told = if missing == Missing::EnoughBattery { "way home needs 30.5" } else { missing.text() };
         assert_eq!(rig.said(told), 1, "{missing:?}: {:?}", rig.texts);
         assert!(rig.setpoints.is_empty() && rig.commands.is_empty() && rig.policy.asked.is_empty());
+    }
+}
+
+#[test]
+fn an_aircraft_outside_the_grid_is_told_the_distance() {
+    let north = |metres: f32| CORNER.offset_by(Metres(-metres), Metres(0.0));
+    for (origin, told) in [
+        (north(50.0), "waiting: 50 m outside the grid"),
+        (north(2400.0), "waiting: 2 km outside the grid"),
+        (GeoPoint { lat_deg_e7: 353_632_621, ..CORNER }, " km outside the grid"),
+    ] {
+        let mut rig = Rig::new();
+        rig.vehicle.origin = Some(origin);
+        rig.vehicle.position = Some(Ned { down_m: HOME_DOWN_M - 60.0, ..Ned::default() });
+        rig.request = Some(Request::Engage);
+        rig.run(3.0);
+        assert_eq!(rig.machine.missing(), Some(Missing::InsideFence));
+        assert_eq!(rig.said(told), 1, "{:?}", rig.texts);
     }
 }
 

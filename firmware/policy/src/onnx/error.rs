@@ -6,12 +6,17 @@ use crate::{LOCAL_MAP_CELLS, SelfTestError};
 /// Why a model file is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
-    /// The bytes are not an ONNX model.
-    #[error("not an ONNX model ({0}): give the path of an exported model, or copy the file again")]
+    /// The bytes are not a whole ONNX model.
+    #[error(
+        "damaged, or not an ONNX model ({0}): copy the file again, or give the path of an exported model"
+    )]
     NotOnnx(String),
-    /// The content does not match the seal.
-    #[error("damaged model: SHA-256 {found} instead of {sealed}: copy the file again")]
-    Damaged {
+    /// A whole ONNX file whose content does not match its seal.
+    #[error(
+        "altered after sealing, SHA-256 {found} instead of {sealed}: seal a change of your own with `gleaner seal`, or \
+         copy the file again"
+    )]
+    Altered {
         /// Digest in the metadata.
         sealed: String,
         /// Digest of the content.

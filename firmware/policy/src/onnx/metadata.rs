@@ -156,7 +156,7 @@ pub fn unseal(bytes: &[u8]) -> Result<(ModelProto, ModelInfo, Vec<Golden>), Mode
     content.metadata_props.retain(|property| property.key != key::SHA256);
     let found = sha256(&content);
     if sealed != found {
-        return Err(ModelError::Damaged { sealed: sealed.into(), found });
+        return Err(ModelError::Altered { sealed: sealed.into(), found });
     }
     let (info, goldens) = Metadata::read(&model, found)?;
     interface::check(graph)?;

@@ -144,7 +144,29 @@ fn write_mission(
     let city = order.out.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     write(path, &mission_file::write(&mission, &city))?;
     println!("mission      {}, {} devices, terminal {terminal}", path.display(), mission.devices.len());
+    for line in warnings(&mission) {
+        println!("warning      {line}");
+    }
     Ok(())
+}
+
+/// What an operator should see before such a mission flies.
+fn warnings(mission: &Mission) -> Vec<String> {
+    let roof_m = |cell| mission.heights.height_m(cell).unwrap_or(0);
+    let mut lines = Vec::new();
+    if roof_m(mission.terminal) > 0 {
+        let height_m = roof_m(mission.terminal);
+        lines.push(format!("the terminal is on a building of {height_m} m: the aircraft lands on its roof"));
+    }
+    for DeviceSite { id, cell, .. } in &mission.devices {
+        if roof_m(*cell) > 0 {
+            lines.push(format!("device {id} at {cell} is on a building of {} m", roof_m(*cell)));
+        }
+        if !mission.fence.contains(*cell) {
+            lines.push(format!("device {id} at {cell} is outside the fence"));
+        }
+    }
+    lines
 }
 
 fn sites(
