@@ -8,8 +8,9 @@ use gleaner_radio::{Report, encode};
 use gleaner_units::Db;
 use serde_json::{Value, json};
 use serialport::{SerialPort, TTYPort};
-use std::io::Write;
+use std::io::{BufRead, BufReader, Write};
 use std::net::UdpSocket;
+use std::process::Stdio;
 
 /// A fixture whose configuration begins with these lines.
 fn with(lines: &str) -> Fixture {
@@ -114,6 +115,48 @@ fn bytes_that_are_no_reports_are_named_to_the_operator() {
     }
     autopilot.await_text("radio: 92 bytes, 0 reports: is it an AT modem?");
     running.stop();
+}
+
+/// What `gleaner check` prints about the reports when this datagram arrives on the radio's port.
+fn checked(fixture: &Fixture, datagram: &[u8]) -> String {
+    let held = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+    // Frees the numbers for the process, which prints when it listens.
+    let [autopilot, radio] = held.map(|socket| socket.local_addr().unwrap());
+    let mut gleaner = fixture.gleaner("check");
+    gleaner.args(["--wait", "30", "--autopilot", &format!("udpin:{autopilot}")]);
+    gleaner.args(["--radio", &format!("udpin:{radio}")]);
+    let mut child = gleaner.stdout(Stdio::piped()).spawn().unwrap();
+    let mut reports = None;
+    for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+        let line = line.unwrap();
+        if line.starts_with("ok    autopilot") {
+            let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+            socket.send_to(datagram, radio).unwrap();
+            socket.connect(autopilot).unwrap();
+            FakeAutopilot::over(socket).send_state();
+        }
+        if line.contains(" reports   ") {
+            reports = Some(line);
+        }
+    }
+    child.wait().unwrap();
+    reports.expect("a finding about the reports")
+}
+
+#[test]
+fn the_check_listens_on_the_radio() {
+    let json = b"{\"id\":1,\"snr_db\":6.5}\n";
+    assert_eq!(
+        checked(&Fixture::new(), json),
+        "warn  reports    22 bytes, 0 reports: looks like JSON; write radio_format = \"json_lines\""
+    );
+    let fixture = with("radio_format = \"json_lines\"");
+    assert_eq!(checked(&fixture, json), "ok    reports    22 bytes, 1 reports of 1 devices");
+    let strange = b"{\"id\":77,\"snr_db\":6.5}\n";
+    assert_eq!(
+        checked(&fixture, strange),
+        "warn  reports    23 bytes, 1 reports; not in the mission: 77: correct the ids"
+    );
 }
 
 #[test]

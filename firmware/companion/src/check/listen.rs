@@ -134,9 +134,9 @@ fn advice(likely: Likely, format: RadioFormat) -> String {
         Likely::Json | Likely::Semtech => return "see docs/radio.md for what a report needs".into(),
         Likely::MavLink => return "MAVLink belongs on the autopilot's port".into(),
         Likely::Unknown => return "wrong radio_format or baud rate?".into(),
-        other => return format!("{other} Use a modem that reports, see docs/radio.md"),
+        other => return format!("{other}; a modem must send reports, see docs/radio.md"),
     };
-    format!("{likely}: write radio_format = \"{right}\"")
+    format!("{likely}; write radio_format = \"{right}\"")
 }
 
 fn silence(link: &Port, frames: u32) -> String {
