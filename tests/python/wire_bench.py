@@ -11,7 +11,7 @@ import time
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 READ_BYTES = 512
-WRITTEN = 4000
+WRITTEN = 2000
 
 
 def read(stream):

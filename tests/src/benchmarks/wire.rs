@@ -11,9 +11,9 @@ use std::hint::black_box;
 
 /// Golden packets of a flight's stream.
 const NAMES: [&str; 4] = ["heartbeat_copter_guided", "local_position_ned", "battery_status", "rc_channels"];
-const ROUNDS: usize = 30;
+const ROUNDS: usize = 20;
 /// Packets of one reading.
-const PACKETS: usize = 4_000;
+const PACKETS: usize = 2_000;
 /// Bytes of one read.
 const READ_BYTES: usize = 512;
 /// `SET_POSITION_TARGET_LOCAL_NED`: id, CRC_EXTRA and payload length.
