@@ -67,7 +67,7 @@ pub(super) fn steps(page: &mut String) -> Result<()> {
     writeln!(page, "## World\n\nOne thread, RD, six devices, resets included.\n")?;
     writeln!(page, "| step | time | million steps/s |\n|---|---|---|")?;
     for ((name, _), times) in contenders.iter().zip(&times) {
-        writeln!(page, "| {name} | {} | {:.2} |", times.text(), 1.0 / times.median())?;
+        writeln!(page, "| {name} | {} | {:.3} |", times.text(), 1.0 / times.median())?;
     }
     Ok(())
 }
