@@ -83,6 +83,8 @@ try_amd64() {
 try_run() {
     local root=$1 log=$2 sitl=$repository/target/release/gleaner-sitl port running
     [[ -x $sitl ]] || fail "gleaner-sitl is not built: cargo build --release"
+    : >"$work/serve.log"
+    : >"$log"
     "$sitl" serve --companion tcpin:127.0.0.1:0 --radio udpout:127.0.0.1:9 --gcs udpin:127.0.0.1:0 \
         --out "$work/flight" >"$work/serve.log" 2>&1 &
     serving=$!
