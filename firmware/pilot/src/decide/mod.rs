@@ -6,6 +6,8 @@ mod deliberator;
 #[cfg(feature = "std")]
 mod logged;
 #[cfg(feature = "std")]
+mod logged_lookahead;
+#[cfg(feature = "std")]
 mod replay;
 
 pub(crate) use decider::{Decider, Standpoint};
@@ -14,4 +16,6 @@ pub use deliberator::{Deliberator, LookAheadRecord, LookingAhead, Place};
 #[cfg(feature = "std")]
 pub use logged::{LoggedDecision, SimulatedSlot};
 #[cfg(feature = "std")]
-pub use replay::{LoggedDevice, LoggedLookAhead, LoggedMission, LookAheadReplay, Replayed};
+pub use logged_lookahead::{LoggedDevice, LoggedLookAhead, LoggedMission};
+#[cfg(feature = "std")]
+pub use replay::{LookAheadReplay, Replayed};
