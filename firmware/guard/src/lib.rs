@@ -21,7 +21,16 @@
 //! every state of small grids and random walks on large ones.
 //!
 //! # When you may trust this
-//! The theorem is about cells and the given battery level. Whether a move really costs one unit is monitored by the pilot.
+//! The theorem is about cells and a battery level in units. It assumes:
+//! - **Unit price.** A move takes at most one unit and a hover at most half of one. The pilot learns the real prices from the
+//!   measured charge and offers the guard the charge divided by the higher one, with a margin of 3 %. Until the battery has
+//!   shown a few percent of use, the nominal price holds.
+//! - **Wind.** A price learned on the way out is assumed on the way home. A headwind that begins later, or on one course only,
+//!   is not covered until it is learned; `GLN_RESERVE` is for that.
+//! - **Landing.** Descent and landing at the terminal are taken off the charge before it is offered, from the altitude and
+//!   the autopilot's descent rate. After a fault the autopilot returns to where it took off, which is not budgeted.
+//! - **Place.** The aircraft is in the given cell, or on a decided move into it whose unit is taken off.
+//!
 //! If the battery drains faster, the state becomes infeasible, and [`Guard::mask`] then allows only moves that shorten the
 //! way home. The guard does not depend on the policy.
 #![no_std]

@@ -2,9 +2,9 @@
 
 use crate::{DeviceSite, Mission, Vehicle};
 use core::fmt::{self, Write};
-use gleaner_link::{AutopilotCommand, Parameters, Severity};
+use gleaner_link::{AutopilotCommand, Parameters, PositionTarget, Severity};
 use gleaner_policy::DeviceState;
-use gleaner_units::{BatteryUnits, Duration, Instant, MetresPerSecond, Ned};
+use gleaner_units::{BatteryUnits, Duration, Instant, MetresPerSecond};
 use heapless::{String, Vec};
 
 /// What the operator requests.
@@ -100,6 +100,8 @@ pub struct Inputs<'a> {
     pub other_mode_seen: bool,
     /// Whether the autopilot followed a target that we did not send, since we began to send targets.
     pub foreign_target: bool,
+    /// Whether the autopilot reported the target that it follows since the last poll.
+    pub target_reported: bool,
     /// Commands of ours that ended since the last poll, and whether the autopilot accepted them.
     pub ended: &'a [(AutopilotCommand, bool)],
     /// Whether an input on the companion or board inhibits engaging, such as a remove-before-flight switch.
@@ -140,8 +142,8 @@ pub struct Telemetry {
 pub struct Outputs {
     /// Drop every target and command of ours that has not left or is not answered yet. Comes before the rest.
     pub withdraw: bool,
-    /// Position target; always finite.
-    pub setpoint: Option<Ned>,
+    /// Position target, with a velocity while it moves; always finite.
+    pub setpoint: Option<PositionTarget>,
     /// A command for the autopilot; the link repeats it until it is answered.
     pub command: Option<AutopilotCommand>,
     /// Lines for the operator.

@@ -6,6 +6,9 @@ use gleaner_link::Autopilot;
 use gleaner_policy::Preference;
 use gleaner_units::{Cell, Duration, GridFrame, Instant, Metres};
 
+/// Heartbeats come once a second: two may be lost.
+const HEARTBEAT_AGE: Duration = Duration::from_millis(2_500);
+
 /// The facts of one poll.
 #[derive(Clone, Copy)]
 pub(crate) struct Scene<'a> {
@@ -17,6 +20,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) evidence_from: Option<Instant>,
     /// Whether this poll came too late after the last one.
     pub(crate) late: bool,
+    /// Seconds of the vehicle per second of ours.
+    pub(crate) pace: f32,
 }
 
 impl<'a> Scene<'a> {
@@ -28,6 +33,16 @@ impl<'a> Scene<'a> {
     pub(crate) fn hears(&self) -> bool {
         let at = self.vehicle().heartbeat_at;
         at.is_some_and(|at| self.evidence_from.is_none_or(|from| at > from))
+    }
+
+    /// Whether a heartbeat is recent enough to act on: nothing new is decided and no target leaves without one.
+    pub(crate) fn is_heard(&self) -> bool {
+        self.hears() && self.heartbeat_age().is_some_and(|age| age <= HEARTBEAT_AGE)
+    }
+
+    /// Time since the last heartbeat.
+    pub(crate) fn heartbeat_age(&self) -> Option<Duration> {
+        self.vehicle().heartbeat_at.map(|at| self.now.since(at))
     }
 
     /// Whether a fresh heartbeat that arrived after `reason` shows that the aircraft is ours: armed and in GUIDED or

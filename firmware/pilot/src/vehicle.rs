@@ -35,6 +35,8 @@ pub struct Vehicle {
     pub home_down_m: Option<f32>,
     /// Battery left, whole percent, truncated.
     pub battery_percent: Option<u8>,
+    /// Charge drawn from the battery since the autopilot started, mAh.
+    pub battery_drawn_mah: Option<u32>,
 }
 
 impl Vehicle {
@@ -58,6 +60,7 @@ impl Vehicle {
                 (f64::from(origin.altitude_amsl_mm) - f64::from(home.altitude_amsl_mm)) as f32 * 1e-3
             }),
             battery_percent: autopilot.battery_percent(now, BATTERY_AGE),
+            battery_drawn_mah: autopilot.battery_drawn_mah(now, BATTERY_AGE),
         }
     }
 

@@ -6,8 +6,9 @@
 //! all devices are drawn for the cell that the aircraft is sent to. A flight therefore collects exactly what an episode
 //! of the same seed and the same actions collects; a test compares the two.
 //!
-//! The reports for the next cell go out as soon as the slot is decided, while the aircraft is still on its way. No
-//! decision is made between the two cells, so the pilot gains nothing from the early reports.
+//! The reports for the next cell go out as soon as the slot is decided, while the aircraft is still on its way. The pilot
+//! decides for a cell up to one cell before it is there. A real radio then still reports the signal of the cell before, so
+//! the simulation is optimistic there: it keeps the slots of training.
 
 use gleaner_radio::Report;
 use gleaner_units::{Action, Cell, Duration, Instant};

@@ -17,7 +17,7 @@ const CORNER: GeoPoint = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_
 /// Where the aircraft stands relative to its estimator's origin: it was carried there after it was switched on. A pilot
 /// that takes home for the origin flies beside its cells, and the referee reports it.
 const STAND: Ned = Ned { north_m: 12.0, east_m: -7.0, down_m: 0.5 };
-/// `GLN_SPEED`, by default the autopilot's `WPNAV_SPEED`.
+/// Default of `GLN_SPEED`: the autopilot's `WPNAV_SPEED`.
 const CRUISE: MetresPerSecond = MetresPerSecond(10.0);
 /// The highest `GLN_SPEED`, for a sped-up aircraft: a slot of hovering then lasts a second.
 const TOP_SPEED: MetresPerSecond = MetresPerSecond(20.0);
@@ -42,6 +42,8 @@ pub struct MissionPlan {
     /// Aircraft seconds per second of the pilot's clock. A pilot in this process shares the aircraft's clock: 1. An
     /// emulated board runs on the wall clock, and a whole mission would take ten minutes.
     pub speedup: f32,
+    /// `GLN_SPEED`.
+    pub speed: MetresPerSecond,
     /// Which autopilot is simulated.
     pub autopilot: AutopilotKind,
     /// How much power flying takes.
@@ -63,6 +65,7 @@ impl MissionPlan {
             reserve,
             wander_m: 0.0,
             speedup: 1.0,
+            speed: CRUISE,
             autopilot: AutopilotKind::ArduPilot,
             energy: EnergyModel::Nominal,
             rotation: Degrees(0.0),
@@ -203,7 +206,7 @@ impl MissionSetup {
             ("GLN_BAT_UNITS", self.aircraft.pack.capacity.0),
             ("GLN_RESERVE", self.plan.reserve.0),
             ("GLN_ALT", ALTITUDE_M),
-            ("GLN_SPEED", if self.plan.speedup > 1.0 { TOP_SPEED.0 } else { CRUISE.0 }),
+            ("GLN_SPEED", if self.plan.speedup > 1.0 { TOP_SPEED.0 } else { self.plan.speed.0 }),
         ]
     }
 

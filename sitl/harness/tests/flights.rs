@@ -135,7 +135,7 @@ fn switches_go_out_by_command_and_by_parameter() {
 
 #[test]
 fn after_a_take_over_the_pilot_stays_passive() {
-    let after = Duration::from_secs(40);
+    let after = Duration::from_secs(20);
     for mode in [VehicleMode::Hold, VehicleMode::Brake, VehicleMode::Stabilize] {
         let incidents = vec![
             Incident { after, kind: IncidentKind::pilot_selects(mode) },

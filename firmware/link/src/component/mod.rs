@@ -213,7 +213,7 @@ impl Component {
             // PX4 before OFFBOARD: it follows targets of its own, and ours are not in force yet.
             self.steering.end();
         }
-        self.steering.sent(now, target.position);
+        self.steering.sent(now, *target);
         Ok(())
     }
 
@@ -237,6 +237,12 @@ impl Component {
     #[must_use]
     pub const fn foreign_target(&self) -> Option<Ned> {
         self.steering.foreign()
+    }
+
+    /// Whether the autopilot reported the target that it follows since the last call. A target of ours that leaves right
+    /// after such a report replaces no target that was not reported.
+    pub fn take_target_report(&mut self) -> bool {
+        self.steering.take_reported()
     }
 
     /// Whether a heartbeat since the last call showed a mode in which we do not steer.

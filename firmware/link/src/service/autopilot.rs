@@ -183,6 +183,12 @@ impl Autopilot {
             .or_else(|| fresh(self.known.sys_battery_percent, now, max_age).flatten())
     }
 
+    /// Charge drawn from the main battery, mAh, if reported within `max_age`.
+    #[must_use]
+    pub fn battery_drawn_mah(&self, now: Instant, max_age: Duration) -> Option<u32> {
+        fresh(self.known.battery, now, max_age).and_then(|battery| battery.consumed_mah)
+    }
+
     /// Pulse of an RC channel (from 1), microseconds, if reported within a second.
     #[must_use]
     pub fn rc_pulse_us(&self, now: Instant, channel: u8) -> Option<u16> {

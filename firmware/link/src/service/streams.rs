@@ -36,7 +36,8 @@ const STREAMS: [Stream; COUNT] = [
     stream(dialect::SYS_STATUS_DATA::ID, 2, None),
     stream(dialect::HOME_POSITION_DATA::ID, 1, None),
     stream(dialect::GLOBAL_POSITION_INT_DATA::ID, 2, None),
-    stream(dialect::POSITION_TARGET_LOCAL_NED_DATA::ID, 5, None),
+    // A target of ours leaves after each report: the stream of moving targets needs more than 10 Hz.
+    stream(dialect::POSITION_TARGET_LOCAL_NED_DATA::ID, 12, None),
     stream(dialect::RC_CHANNELS_DATA::ID, 5, None),
 ];
 

@@ -1,4 +1,4 @@
-//! What flying really takes from the battery, learned from the measured percentage.
+//! What flying really takes from the battery, learned from the measured charge.
 //!
 //! Battery units are priced nominally: one for a cell, half of one for a slot of hovering. The real price depends on
 //! wind, speed and aircraft. MAVLink carries the charge in whole percent, so the only exact moments are those at which
@@ -8,8 +8,11 @@
 //! units used = cell x cells flown + hover x nominal units hovered
 //! ```
 //!
-//! and the two prices are the least-squares solution over the last steps, with a prior that both are 1.
+//! and the two prices are the least-squares solution over the last steps, with a prior that both are 1. Where the monitor
+//! counts mAh, and these agree with the percentage, each half percent of them gives such an equation instead
+//! ([`super::charge`]).
 
+use crate::flight::charge::Charge;
 use gleaner_units::BatteryUnits;
 
 /// Nominal units per second of hovering: half a unit for the two seconds in which 20 m are flown at 10 m/s.
@@ -22,6 +25,8 @@ const PRIOR: f32 = 0.3;
 pub(crate) const JUMP_PERCENT: u8 = 5;
 /// A price that is learned this close to the nominal one is noise of whole percents.
 const NOISE: f32 = 1.05;
+/// Percent that an equation from mAh spans at least.
+const MAH_PERCENT: f32 = 0.5;
 /// Bounds of a learned price: beyond them the monitor is at fault, not the wind.
 const CHEAPEST: f32 = 0.3;
 const DEAREST: f32 = 3.0;
@@ -55,11 +60,21 @@ pub(crate) struct Burn {
     percent: Option<u8>,
     /// Whether the percentage has stepped since it was first seen: before that the interval has no exact start.
     anchored: bool,
+    charge: Charge,
+    /// mAh drawn when `flown` began, if it counts by them.
+    mah: Option<u32>,
 }
 
 impl Burn {
     pub(crate) const fn new() -> Burn {
-        Burn { sums: [0.0; 5], flown: Flown { cells: 0.0, hover: 0.0 }, percent: None, anchored: false }
+        Burn {
+            sums: [0.0; 5],
+            flown: Flown { cells: 0.0, hover: 0.0 },
+            percent: None,
+            anchored: false,
+            charge: Charge::new(),
+            mah: None,
+        }
     }
 
     /// A fraction of a cell was flown.
@@ -77,25 +92,62 @@ impl Burn {
         self.flown = Flown::default();
         self.percent = None;
         self.anchored = false;
+        self.charge.jumped();
+        self.mah = None;
     }
 
-    /// Takes in the measured percentage. `full`: units of a full battery.
-    pub(crate) fn read(&mut self, percent: u8, full: BatteryUnits) -> Reading {
+    /// Takes in the measured percentage and the mAh drawn. `full`: units of a full battery.
+    pub(crate) fn read(&mut self, percent: u8, mah: Option<u32>, full: BatteryUnits) -> Reading {
+        let by_mah = self.charge.mah_per_percent().zip(mah);
+        if let Some((per_percent, mah)) = by_mah {
+            self.read_mah(mah, per_percent, full);
+        } else {
+            self.mah = None;
+        }
         let Some(last) = self.percent.replace(percent) else { return Reading::Same };
         if percent == last {
             return Reading::Same;
         }
-        let flown = core::mem::take(&mut self.flown);
         let was_anchored = core::mem::replace(&mut self.anchored, true);
         let step = last.saturating_sub(percent);
         if step == 0 || step > JUMP_PERCENT {
             self.anchored = false;
+            self.charge.jumped();
+            if by_mah.is_none() {
+                self.flown = Flown::default();
+            }
             return Reading::Jump;
         }
-        if was_anchored {
-            self.learn(flown, full.0 * f32::from(step) / 100.0);
+        self.charge.stepped(step, mah);
+        if by_mah.is_none() {
+            let flown = core::mem::take(&mut self.flown);
+            if was_anchored {
+                self.learn(flown, full.0 * f32::from(step) / 100.0);
+            }
         }
         Reading::Step
+    }
+
+    /// One equation for each half percent of the charge drawn.
+    fn read_mah(&mut self, mah: u32, per_percent: f32, full: BatteryUnits) {
+        let drawn = self.mah.map(|from| mah.checked_sub(from));
+        match drawn {
+            Some(Some(drawn)) => {
+                let percent = drawn as f32 / per_percent;
+                if percent >= MAH_PERCENT {
+                    let flown = core::mem::take(&mut self.flown);
+                    // A counter that leaps was reset, or counts another battery.
+                    if percent <= f32::from(JUMP_PERCENT) {
+                        self.learn(flown, full.0 * percent / 100.0);
+                    }
+                    self.mah = Some(mah);
+                }
+            }
+            Some(None) | None => {
+                self.flown = Flown::default();
+                self.mah = Some(mah);
+            }
+        }
     }
 
     fn learn(&mut self, Flown { cells, hover }: Flown, used: f32) {
@@ -150,7 +202,7 @@ mod tests {
                     burn.flew(0.025);
                     left -= cell / 40.0;
                 }
-                burn.read(left as u8, FULL);
+                burn.read(left as u8, None, FULL);
             }
         }
         burn
@@ -163,6 +215,36 @@ mod tests {
             assert!((learned_cell - cell).abs() < 0.12 * cell, "{learned_cell} for {cell}");
             assert!((learned_hover - hover_slot / 0.5).abs() < 0.4, "{learned_hover} for {hover_slot}");
         }
+    }
+
+    /// A pack of 3,300 mAh whose monitor shows steps of 2 percent.
+    #[test]
+    fn mah_teach_where_the_percentage_is_coarse() {
+        let mut burn = Burn::new();
+        let (cell, mut left) = (1.6_f32, 95.2_f32);
+        let read = |burn: &mut Burn, left: f32| {
+            let percent = (left / 2.0) as u8 * 2;
+            burn.read(percent, Some((33.0 * (100.0 - left)) as u32), FULL)
+        };
+        for _ in 0..25 {
+            for _ in 0..20 {
+                burn.flew(0.05);
+                left -= cell / 20.0;
+                read(&mut burn, left);
+            }
+        }
+        let (learned, _) = burn.learned();
+        assert!((learned - cell).abs() < 0.1, "{learned}");
+        // A percentage that jumps with the voltage does not disturb it.
+        for percent in [20, 60, 30] {
+            assert_eq!(burn.read(percent, Some((33.0 * (100.0 - left)) as u32), FULL), Reading::Jump);
+        }
+        for _ in 0..40 {
+            burn.flew(0.05);
+            left -= 2.4 / 20.0;
+            burn.read(30, Some((33.0 * (100.0 - left)) as u32), FULL);
+        }
+        assert!(burn.learned().0 > learned + 0.1, "it goes on learning: {}", burn.learned().0);
     }
 
     #[test]
@@ -178,11 +260,11 @@ mod tests {
     fn jumps_teach_nothing() {
         let mut burn = fly(1.0, 0.5, 30);
         let before = burn.learned();
-        assert_eq!(burn.read(40, FULL), Reading::Jump);
-        assert_eq!(burn.read(60, FULL), Reading::Jump);
-        assert_eq!(burn.read(60, FULL), Reading::Same);
+        assert_eq!(burn.read(40, None, FULL), Reading::Jump);
+        assert_eq!(burn.read(60, None, FULL), Reading::Jump);
+        assert_eq!(burn.read(60, None, FULL), Reading::Same);
         burn.flew(5.0);
-        assert_eq!(burn.read(59, FULL), Reading::Step);
+        assert_eq!(burn.read(59, None, FULL), Reading::Step);
         assert_eq!(burn.learned(), before, "the interval after a jump has no exact start");
     }
 }

@@ -15,7 +15,8 @@ const DESCENT_SHARE: f32 = 0.9;
 /// autopilots, so up to one percent more than reported may be there: the cap is `percent + 1`, and `GLN_RESERVE` must
 /// cover that one percent. The cap does not last: when a sagging voltage recovers, the account is still the account.
 ///
-/// A mission lasts from arming to disarming: a take-over and a second engagement do not reopen a spent budget.
+/// A mission lasts from arming to disarming: a take-over, a second engagement and a restart of the program
+/// ([`Energy::resume`]) do not reopen a spent budget.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Energy {
     left: BatteryUnits,
@@ -35,6 +36,13 @@ impl Energy {
         self.burn.interrupt();
     }
 
+    /// Continues a mission of an earlier run of the program, which used `spent`. Only what is more than known counts.
+    pub(crate) fn resume(&mut self, spent: BatteryUnits) {
+        if spent.0.is_finite() && self.spent < spent {
+            self.spent = spent;
+        }
+    }
+
     /// Units that could be used from here if the mission were engaged now.
     pub(crate) fn offered(&self, scene: &Scene<'_>, percent: u8) -> BatteryUnits {
         smaller(self.measured(scene, percent), scene.mission.budget - self.spent)
@@ -46,10 +54,11 @@ impl Energy {
         self.burn.interrupt();
     }
 
-    /// What may be used, given the latest measurement if there is one.
-    pub(crate) fn available(&self, scene: &Scene<'_>) -> BatteryUnits {
+    /// What may be used once `ahead` is flown, which is paid for but not yet taken from the battery. Given the latest
+    /// measurement if there is one.
+    pub(crate) fn available(&self, scene: &Scene<'_>, ahead: BatteryUnits) -> BatteryUnits {
         match scene.vehicle().battery_percent {
-            Some(percent) => smaller(self.left, self.measured(scene, percent.saturating_add(1))),
+            Some(percent) => smaller(self.left, self.measured(scene, percent.saturating_add(1)) - ahead),
             None => self.left,
         }
     }
@@ -65,11 +74,12 @@ impl Energy {
         self.spent
     }
 
-    /// Takes in the measured percentage; whether it jumped.
+    /// Takes in the measured charge; whether the percentage jumped.
     pub(crate) fn read(&mut self, scene: &Scene<'_>) -> bool {
         let full = scene.inputs.parameters.full_battery();
-        let percent = scene.vehicle().battery_percent;
-        percent.is_some_and(|percent| self.burn.read(percent, full) == Reading::Jump)
+        let vehicle = scene.vehicle();
+        let mah = vehicle.battery_drawn_mah;
+        vehicle.battery_percent.is_some_and(|percent| self.burn.read(percent, mah, full) == Reading::Jump)
     }
 
     /// Battery percent that a unit costs, as learned.
@@ -77,10 +87,15 @@ impl Energy {
         self.burn.learned().0 * 100.0 / scene.inputs.parameters.full_battery().0
     }
 
-    /// Percent expected at touchdown after the way home from `cell`; negative when it does not suffice.
-    pub(crate) fn touchdown_percent(&self, scene: &Scene<'_>, cell: Cell) -> Option<f32> {
+    /// Percent expected at touchdown after `ahead` and the way home from `cell`; negative when it does not suffice.
+    pub(crate) fn touchdown_percent(
+        &self,
+        scene: &Scene<'_>,
+        cell: Cell,
+        ahead: BatteryUnits,
+    ) -> Option<f32> {
         let percent = f32::from(scene.vehicle().battery_percent?);
-        let way = f32::from(scene.guard.distance(cell)?);
+        let way = f32::from(scene.guard.distance(cell)?) + ahead.0;
         let full = scene.inputs.parameters.full_battery().0;
         Some(percent - way * self.unit_percent(scene) - self.landing(scene).0 * 100.0 / full)
     }
@@ -89,14 +104,14 @@ impl Energy {
     pub(crate) fn least_percent(&self, scene: &Scene<'_>) -> Option<f32> {
         let percent = f32::from(scene.vehicle().battery_percent?);
         let full = scene.inputs.parameters.full_battery().0;
-        let used = self.available(scene) - scene.guard.reserve();
+        let used = self.available(scene, BatteryUnits(0.0)) - scene.guard.reserve();
         let used = used.0 * self.burn.price(scene.slot().as_secs_f32()) + self.landing(scene).0;
         Some(percent - used * 100.0 / full)
     }
 
-    /// Whether the measured charge still covers the way from `cell` and the landing, without reserve.
-    pub(crate) fn reaches_home(&self, scene: &Scene<'_>, cell: Cell) -> bool {
-        self.touchdown_percent(scene, cell).is_none_or(|percent| percent + 1.0 > 0.0)
+    /// Whether the measured charge still covers `ahead`, the way from `cell` and the landing, without reserve.
+    pub(crate) fn reaches_home(&self, scene: &Scene<'_>, cell: Cell, ahead: BatteryUnits) -> bool {
+        self.touchdown_percent(scene, cell, ahead).is_none_or(|percent| percent + 1.0 > 0.0)
     }
 
     /// Whether little more than the landing is left.

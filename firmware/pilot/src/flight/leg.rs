@@ -1,6 +1,6 @@
 //! One leg: the flight to a cell centre, or the hover over it.
 
-use gleaner_units::{Cell, Duration, Instant, Metres, Ned};
+use gleaner_units::{BatteryUnits, Cell, Duration, Instant, Metres, Ned};
 
 /// How long a leg may go without progress: long against a gust (a cell takes about 5 s), short against a battery.
 pub(crate) const STALL: Duration = Duration::from_secs(20);
@@ -28,9 +28,11 @@ pub(crate) struct Leg {
     pub(crate) target: Ned,
     pub(crate) purpose: Purpose,
     /// Where the aircraft was sent from.
-    start: Ned,
+    pub(crate) start: Ned,
     /// Fraction of the way that was covered at most.
     covered: f32,
+    /// The least time that the leg takes.
+    slot: Duration,
     not_before: Instant,
     nearest_m: f32,
     progress_at: Instant,
@@ -62,6 +64,7 @@ impl Leg {
             purpose,
             start,
             covered: 0.0,
+            slot: Duration::default(),
             not_before: now,
             nearest_m: f32::INFINITY,
             progress_at: now,
@@ -96,7 +99,35 @@ impl Leg {
 
     /// The same leg, not over before `slot` has passed.
     pub(crate) fn lasting(self, slot: Duration) -> Leg {
-        Leg { not_before: self.not_before + slot, ..self }
+        Leg { slot, not_before: self.not_before + slot, ..self }
+    }
+
+    /// The same leg, beginning now: a leg may be decided before the aircraft is where it begins.
+    pub(crate) fn beginning(self, now: Instant) -> Leg {
+        Leg { not_before: now + self.slot, progress_at: now, ..self }
+    }
+
+    /// The direction over the ground, north and east, and the length in metres. The direction of a leg without a length
+    /// is north.
+    pub(crate) fn direction(&self) -> ([f32; 2], f32) {
+        let [north_m, east_m] =
+            [self.target.north_m - self.start.north_m, self.target.east_m - self.start.east_m];
+        let length_m = libm::hypotf(north_m, east_m);
+        let direction = if length_m > 0.0 { [north_m / length_m, east_m / length_m] } else { [1.0, 0.0] };
+        (direction, length_m)
+    }
+
+    /// Battery units of this leg that are still to be flown.
+    pub(crate) fn units_ahead(&self) -> BatteryUnits {
+        match self.purpose {
+            Purpose::Centre | Purpose::Hover => BatteryUnits(0.0),
+            Purpose::Move => BatteryUnits(1.0 - self.covered),
+        }
+    }
+
+    /// The leg is flown: the fraction of it that was not counted.
+    pub(crate) fn complete(&mut self) -> f32 {
+        1.0 - core::mem::replace(&mut self.covered, 1.0)
     }
 
     /// Ends the wait for the slot.

@@ -64,6 +64,12 @@ impl Machine {
         Ok(())
     }
 
+    /// Continues the budget of a mission that an earlier run of the program flew, in which it used `spent`. It counts until
+    /// the motors are armed anew.
+    pub fn resume_budget(&mut self, spent: BatteryUnits) {
+        self.energy.resume(spent);
+    }
+
     /// One step. Call at 20 Hz or more.
     ///
     /// # Cost
@@ -101,7 +107,15 @@ impl Machine {
         out: &mut Outputs,
     ) -> Outcome {
         let Machine { mission, guard, phase, decider, energy, monitor, .. } = self;
-        let scene = Scene { now, mission, guard, inputs, evidence_from: monitor.evidence_from(), late };
+        let scene = Scene {
+            now,
+            mission,
+            guard,
+            inputs,
+            evidence_from: monitor.evidence_from(),
+            late,
+            pace: monitor.pace(),
+        };
         match phase {
             Phase::Boot | Phase::Idle | Phase::Passive(_) => Outcome::Stay,
             Phase::Waiting(wait) => wait.step(&scene, energy, out),
@@ -115,14 +129,11 @@ impl Machine {
     /// The one place where targets leave.
     fn send_target(&mut self, now: Instant, inputs: &Inputs<'_>, out: &mut Outputs) {
         let Machine { mission, guard, phase, monitor, .. } = self;
+        let evidence_from = monitor.evidence_from();
+        let scene = Scene { now, mission, guard, inputs, evidence_from, late: false, pace: monitor.pace() };
         out.setpoint = match phase {
-            Phase::Flying(flight) => {
-                inputs.vehicle.firmware.and_then(|firmware| flight.target_due(now, firmware))
-            }
-            Phase::Waiting(wait) => {
-                let evidence_from = monitor.evidence_from();
-                wait.target_due(&Scene { now, mission, guard, inputs, evidence_from, late: false })
-            }
+            Phase::Flying(flight) => flight.target_due(&scene),
+            Phase::Waiting(wait) => wait.target_due(&scene),
             _ => None,
         };
     }
@@ -204,7 +215,7 @@ impl Machine {
     #[must_use]
     pub const fn target(&self) -> Option<Cell> {
         match &self.phase {
-            Phase::Flying(flight) => Some(flight.leg.cell),
+            Phase::Flying(flight) => Some(flight.course.leg.cell),
             _ => None,
         }
     }

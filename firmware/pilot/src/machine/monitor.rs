@@ -11,7 +11,9 @@ const LATE: Duration = Duration::from_secs(1);
 /// after it they have been read, and a heartbeat is evidence again.
 const DRAIN: Duration = Duration::from_millis(500);
 /// Over this time the vehicle's clock is compared with ours.
-const CLOCK_PERIOD: Duration = Duration::from_secs(10);
+const CLOCK_PERIOD: Duration = Duration::from_secs(3);
+/// Two comparisons in a row differ by less than this factor, else messages were late.
+const CLOCK_AGREES: f32 = 1.1;
 
 /// The watches that outlive a flight.
 #[derive(Clone, Debug)]
@@ -23,6 +25,10 @@ pub(super) struct Monitor {
     altitude_m: Option<f32>,
     clock: Option<(Instant, u32)>,
     clock_reported: bool,
+    /// The last comparison of the clocks.
+    clock_ratio: f32,
+    /// Seconds of the vehicle per second of ours.
+    pace: f32,
     vehicle_seen: bool,
     disarmed_seen: bool,
     reported_at: Option<Instant>,
@@ -39,6 +45,8 @@ impl Monitor {
             altitude_m: None,
             clock: None,
             clock_reported: false,
+            clock_ratio: 1.0,
+            pace: 1.0,
             vehicle_seen: false,
             disarmed_seen: false,
             reported_at: None,
@@ -125,7 +133,12 @@ impl Monitor {
         }
     }
 
-    /// Slots and timeouts run on our clock. A simulator with a speed factor would need the vehicle's.
+    /// Seconds of the vehicle per second of ours: 1 unless a simulator runs faster or slower.
+    pub(super) const fn pace(&self) -> f32 {
+        self.pace
+    }
+
+    /// Slots and timeouts run on our clock; only the moving target runs on the vehicle's, because its velocity does.
     fn watch_clock(&mut self, now: Instant, inputs: &Inputs<'_>, out: &mut Outputs) {
         let Some(boot_ms) = inputs.vehicle.boot_ms else {
             self.clock = None;
@@ -138,8 +151,16 @@ impl Monitor {
         }
         self.clock = Some((now, boot_ms));
         let ratio = boot_ms.wrapping_sub(since_ms) as f32 * 1e-3 / ours.as_secs_f32();
-        let is_off = !(0.8..=1.25).contains(&ratio) && ratio < 1e3;
-        if is_off && !core::mem::replace(&mut self.clock_reported, true) {
+        let last = core::mem::replace(&mut self.clock_ratio, ratio);
+        if (0.8..=1.25).contains(&ratio) {
+            self.pace = 1.0;
+            return;
+        }
+        let agrees = ratio < CLOCK_AGREES * last && last < CLOCK_AGREES * ratio && ratio < 1e3;
+        if agrees {
+            self.pace = ratio;
+        }
+        if agrees && !core::mem::replace(&mut self.clock_reported, true) {
             let ratio = Decimal::<1>(ratio);
             out.say(Severity::Warning, format_args!("gleaner: vehicle clock at {ratio} x, real time only"));
         }

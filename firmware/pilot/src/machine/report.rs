@@ -22,13 +22,13 @@ impl Machine {
         self.monitor.set_collected(collected(&self.mission, inputs.devices));
         let Machine { mission, guard, monitor, energy, phase, decider, .. } = self;
         let evidence_from = monitor.evidence_from();
-        let scene = Scene { now, mission, guard, inputs, evidence_from, late: false };
-        let cell = match phase {
-            Phase::Flying(flight) => Some(flight.leg.cell),
+        let scene = Scene { now, mission, guard, inputs, evidence_from, late: false, pace: monitor.pace() };
+        let course = match phase {
+            Phase::Flying(flight) => Some((flight.course.last_cell(), flight.course.units_ahead())),
             _ => None,
         };
-        let spare = match (cell, &phase) {
-            (Some(cell), _) => guard.spare(cell, energy.available(&scene)),
+        let spare = match (course, &phase) {
+            (Some((cell, ahead)), _) => guard.spare(cell, energy.available(&scene, ahead)),
             (None, Phase::Shadow(_)) => decider.last().map(|decision| decision.spare),
             _ => None,
         };
@@ -38,7 +38,7 @@ impl Machine {
             spare,
             attended: decider.last().and_then(|decision| decision.attended),
             unit_pct: energy.unit_percent(&scene),
-            land_pct: cell.and_then(|cell| energy.touchdown_percent(&scene, cell)),
+            land_pct: course.and_then(|(cell, ahead)| energy.touchdown_percent(&scene, cell, ahead)),
             snr_off,
         });
     }

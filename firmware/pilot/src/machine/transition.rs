@@ -121,7 +121,7 @@ impl Machine {
             Phase::Idle => out.say(Severity::Info, format_args!("gleaner: idle")),
             Phase::Waiting(_) => out.say(Severity::Info, format_args!("gleaner: engage requested")),
             Phase::Flying(flight) => {
-                out.say(Severity::Notice, format_args!("gleaner: engaged at {}", flight.leg.cell));
+                out.say(Severity::Notice, format_args!("gleaner: engaged at {}", flight.course.leg.cell));
             }
             Phase::Done { landed: false } => {
                 out.say(Severity::Notice, format_args!("gleaner: landing, {percent} % collected"));
@@ -145,7 +145,7 @@ impl Machine {
     fn announce_touchdown(&self, now: Instant, inputs: &Inputs<'_>, out: &mut Outputs) {
         let Machine { mission, guard, monitor, energy, .. } = self;
         let evidence_from = monitor.evidence_from();
-        let scene = Scene { now, mission, guard, inputs, evidence_from, late: false };
+        let scene = Scene { now, mission, guard, inputs, evidence_from, late: false, pace: monitor.pace() };
         if let Some(percent) = energy.least_percent(&scene) {
             let percent = Decimal::<0>(percent);
             out.say(Severity::Info, format_args!("gleaner: touchdown at {percent} % or more expected"));

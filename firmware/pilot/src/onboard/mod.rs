@@ -137,6 +137,12 @@ impl<P: Deliberator> Onboard<P> {
         Ok(())
     }
 
+    /// Continues the budget of a mission that an earlier run of the program flew, in which it used `spent`
+    /// ([`Stats::spent`]). It counts until the motors are armed anew. Before the first poll.
+    pub fn resume_budget(&mut self, spent: BatteryUnits) {
+        self.machine.resume_budget(spent);
+    }
+
     /// Bytes from the autopilot's link (which also carries the ground station), in any pieces.
     pub fn receive_link(&mut self, now: Instant, bytes: &[u8]) {
         self.link.receive(now, bytes);
@@ -177,6 +183,7 @@ impl<P: Deliberator> Onboard<P> {
         self.follow_knob(now);
         let vehicle = Vehicle::observe(now, self.link.autopilot());
         let other_mode_seen = self.link.take_other_mode();
+        let target_reported = self.link.take_target_report();
         let inputs = Inputs {
             vehicle: &vehicle,
             devices: &self.heard.at(now, self.link.parameters().snr_age()),
@@ -186,6 +193,7 @@ impl<P: Deliberator> Onboard<P> {
             requests: &received.requests,
             other_mode_seen,
             foreign_target: self.link.foreign_target().is_some(),
+            target_reported,
             ended: &received.ended,
             engage_inhibited: self.engage_inhibited,
         };

@@ -2,7 +2,7 @@
 
 use super::Onboard;
 use crate::{Deliberator, Outputs, RECORD_BYTES_MAX, State};
-use gleaner_link::{Enable, ParameterId, PositionTarget, Severity, TUNNEL_DECISION};
+use gleaner_link::{Enable, ParameterId, Severity, TUNNEL_DECISION};
 use gleaner_units::Instant;
 
 impl<P: Deliberator> Onboard<P> {
@@ -10,9 +10,9 @@ impl<P: Deliberator> Onboard<P> {
         if out.withdraw {
             self.link.revoke();
         }
-        if let Some(position) = out.setpoint {
+        if let Some(target) = &out.setpoint {
             // Not sent without an autopilot; its loss is in the next snapshot.
-            let _ = self.link.steer(now, &PositionTarget::at(position));
+            let _ = self.link.steer(now, target);
         }
         if let Some(command) = out.command
             && self.link.request(now, command).is_err()

@@ -4,20 +4,20 @@ use super::Outcome;
 use super::hand_back::Left;
 use super::landing::Landing;
 use crate::decide::{Decider, Deliberator, Standpoint};
+use crate::flight::course::Course;
 use crate::flight::energy::Energy;
 use crate::flight::leg::{Leg, Progress, Purpose};
 use crate::flight::plan::Plan;
+use crate::flight::speed::Speed;
 use crate::flight::stream::Stream;
 use crate::flight::watch::{Finding, Watch, origin_moved};
 use crate::scene::Scene;
 use crate::{Fault, Outputs, ReturnReason, State, TakeOver};
-use gleaner_link::{AutopilotCommand, Firmware, Severity};
-use gleaner_units::{Action, Cell, Decimal, Duration, Instant, Metres, MetresPerSecond, Ned};
+use gleaner_link::{Autopilot, Firmware, PositionTarget, Severity};
+use gleaner_units::{Action, Cell, Decimal, Duration, Instant, Metres, Ned};
 
 /// How long the estimator may mistrust itself before the position counts as lost.
 const UNREADY: Duration = Duration::from_secs(2);
-/// Heartbeats come once a second. Without them no new target is decided.
-const HEARTBEAT_AGE: Duration = Duration::from_millis(2_500);
 /// Legs in a row without progress after which there is nothing left to try.
 const STALLS: u8 = 2;
 
@@ -25,10 +25,9 @@ const STALLS: u8 = 2;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Flight {
     pub(crate) plan: Plan,
-    pub(crate) leg: Leg,
+    pub(crate) course: Course,
     /// `None` while the policy flies.
     pub(crate) homing: Option<ReturnReason>,
-    stream: Stream,
     watch: Watch,
     engaged_at: Instant,
     stepped_at: Instant,
@@ -37,14 +36,6 @@ pub(crate) struct Flight {
     landing: Option<Landing>,
     speed: Speed,
     warned: Warned,
-}
-
-/// The speed requested of the autopilot.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Speed {
-    requested: Option<MetresPerSecond>,
-    /// When another speed was wanted.
-    wanted_at: Option<Instant>,
 }
 
 /// Warnings given once a flight.
@@ -60,9 +51,11 @@ impl Flight {
         let start = position.unwrap_or(centre);
         Flight {
             plan,
-            leg: Leg::new(now, Purpose::Centre, (plan.cell, start), (plan.cell, centre)),
+            course: Course::new(
+                Leg::new(now, Purpose::Centre, (plan.cell, start), (plan.cell, centre)),
+                stream,
+            ),
             homing: None,
-            stream,
             watch: Watch::new(now),
             engaged_at: now,
             stepped_at: now,
@@ -74,25 +67,32 @@ impl Flight {
         }
     }
 
-    /// From now on the guard flies. The leg that is under way is finished first: its end is a cell that the
-    /// guard allowed, with the way home paid for. A hover is cut short.
+    /// From now on the guard flies. The moves that are decided are flown first: their ends are cells that the guard
+    /// allowed, with the way home paid for. A hover is cut short.
     pub(crate) fn go_home(&mut self, reason: ReturnReason) {
         self.homing = Some(reason);
-        self.leg.hurry();
+        self.course.end_hover();
     }
 
     pub(crate) const fn state(&self) -> State {
         if self.homing.is_some() { State::Homing } else { State::Engaged }
     }
 
-    pub(crate) fn target_due(&mut self, now: Instant, firmware: Firmware) -> Option<Ned> {
-        self.stream.due(now, self.leg.target, firmware)
+    /// No target leaves without a recent heartbeat in our mode.
+    pub(crate) fn target_due(&mut self, scene: &Scene<'_>) -> Option<PositionTarget> {
+        if scene.inputs.target_reported {
+            self.course.target_reported();
+        }
+        let firmware = scene.vehicle().firmware.filter(|_| scene.is_heard())?;
+        self.course.target_due(scene.now, firmware)
     }
 
     /// Where the aircraft is left when this flight fails.
     pub(crate) fn left(&self, position: Option<Ned>) -> Left {
-        let within_m = 1.5 * self.plan.frame.grid().cell().0;
-        Left { at: position.filter(Ned::is_finite).unwrap_or(self.leg.target), within_m, unheard: false }
+        let position = position.filter(Ned::is_finite).unwrap_or(self.course.leg.target);
+        let (at, coasting_m) = self.course.stopping(position);
+        let within_m = 1.5 * self.plan.frame.grid().cell().0 + coasting_m;
+        Left { at, within_m, unheard: false }
     }
 
     pub(crate) fn step<D: Deliberator>(
@@ -107,17 +107,22 @@ impl Flight {
             Ok(position) => position,
             Err(outcome) => return outcome,
         };
-        self.count_energy(scene, &position, energy, out);
+        let passed = scene.now.since(core::mem::replace(&mut self.stepped_at, scene.now)).as_secs_f32();
+        self.count_energy(scene, &position, passed, energy, out);
         if let Some(landing) = &mut self.landing {
             return landing.step(scene, out);
         }
-        self.keep_speed(scene, out);
+        self.speed.keep(scene, out);
         if self.homing.is_none()
             && let Some(reason) = self.reason_to_return(scene, out)
         {
             return Outcome::GoHome(reason);
         }
+        self.move_on(scene, &position, passed, energy);
         match self.progress(scene, &position) {
+            Progress::Underway if self.looks_ahead(scene, energy) => {
+                self.decide(scene, energy, decider, policy, out)
+            }
             Progress::Underway => Outcome::Stay,
             Progress::Stalled => self.stalled(scene, &position, out),
             Progress::Arrived if self.is_home(scene) => {
@@ -127,11 +132,37 @@ impl Flight {
                     None => Outcome::GoHome(ReturnReason::Terminal),
                 }
             }
+            Progress::Arrived if self.course.begin_next(scene.now) => Outcome::Stay,
             // Nothing new is decided on old evidence.
-            Progress::Arrived if !self.is_heard(scene) => Outcome::Stay,
-            Progress::Arrived if self.homing.is_some() => self.fly_home(scene, energy, decider, out),
+            Progress::Arrived if !scene.is_heard() => Outcome::Stay,
             Progress::Arrived => self.decide(scene, energy, decider, policy, out),
         }
+    }
+
+    /// Moves the target on. On a missing heartbeat it stops: the aircraft may not be ours any more.
+    fn move_on(&mut self, scene: &Scene<'_>, position: &Ned, secs: f32, energy: &mut Energy) {
+        let is_heard = scene.heartbeat_age().is_some_and(|age| age <= Autopilot::EVIDENCE_AGE);
+        let cruise_mps = if is_heard { scene.inputs.parameters.speed().0 } else { 0.0 };
+        let rest = self.course.advance(position, cruise_mps, secs * scene.pace);
+        if rest > 0.0 {
+            self.stalls = 0;
+            energy.burn.flew(rest);
+        }
+    }
+
+    /// Whether the next decision is due before the aircraft arrives: it is for the cell at the end of the leg.
+    fn looks_ahead(&self, scene: &Scene<'_>, energy: &Energy) -> bool {
+        let ends = self.is_home(scene) || self.lands_here(scene, energy);
+        self.course.needs_decision() && !ends && scene.is_heard()
+    }
+
+    /// Whether the battery is so empty on the way home that the flight ends at the end of the present leg.
+    fn lands_here(&self, scene: &Scene<'_>, energy: &Energy) -> bool {
+        let (cell, ahead) = (self.course.leg.cell, self.course.units_ahead());
+        self.homing.is_some()
+            && !energy.reaches_home(scene, cell, ahead)
+            && energy.must_land(scene)
+            && scene.mission.heights.height_m(cell) == Some(0)
     }
 
     /// Looks, without acting. The human pilot comes first: whatever else is wrong, a mode that we did not request
@@ -168,7 +199,7 @@ impl Flight {
         let position = vehicle.position.filter(Ned::is_finite);
         let position = position.filter(|_| now.since(self.ready_at) <= UNREADY);
         let position = position.ok_or(Outcome::Fault(Fault::PositionLost))?;
-        match self.watch.see(now, vehicle.boot_ms, &position, &self.plan, &self.leg) {
+        match self.watch.see(now, vehicle.boot_ms, &position, &self.plan, &self.course.leg) {
             Finding::Fine => Ok(position),
             // A landing that was requested for another place cannot be laid out anew.
             Finding::Jumped if self.landing.is_some() => Err(Outcome::Fault(Fault::PositionLost)),
@@ -185,12 +216,18 @@ impl Flight {
         }
     }
 
-    fn count_energy(&mut self, scene: &Scene<'_>, position: &Ned, energy: &mut Energy, out: &mut Outputs) {
-        let passed = scene.now.since(self.stepped_at);
-        self.stepped_at = scene.now;
-        match self.leg.purpose {
-            Purpose::Move => energy.burn.flew(self.leg.cover(position)),
-            Purpose::Hover | Purpose::Centre => energy.burn.hovered(passed.as_secs_f32()),
+    fn count_energy(
+        &mut self,
+        scene: &Scene<'_>,
+        position: &Ned,
+        passed_s: f32,
+        energy: &mut Energy,
+        out: &mut Outputs,
+    ) {
+        let leg = &mut self.course.leg;
+        match leg.purpose {
+            Purpose::Move => energy.burn.flew(leg.cover(position)),
+            Purpose::Hover | Purpose::Centre => energy.burn.hovered(passed_s),
         }
         if energy.read(scene) {
             out.say(Severity::Warning, format_args!("gleaner: battery percentage jumped"));
@@ -219,12 +256,16 @@ impl Flight {
         (silent > inputs.rules.blind_return).then_some(ReturnReason::RadioSilent)
     }
 
-    fn progress(&mut self, scene: &Scene<'_>, position: &Ned) -> Progress {
-        // A radius beyond half a cell would let the aircraft arrive in one cell while it is in the next.
+    /// The arrival radius. Beyond half a cell the aircraft would arrive in one cell while it is in the next.
+    fn arrival(&self, scene: &Scene<'_>) -> Metres {
         let half_cell_m = self.plan.frame.grid().cell().0 / 2.0;
-        let radius = Metres(scene.inputs.parameters.arrive_radius().0.min(half_cell_m));
-        let progress = self.leg.watch(scene.now, position, radius);
-        if progress == Progress::Arrived && self.leg.purpose == Purpose::Move {
+        Metres(scene.inputs.parameters.arrive_radius().0.min(half_cell_m))
+    }
+
+    fn progress(&mut self, scene: &Scene<'_>, position: &Ned) -> Progress {
+        let arrival = self.arrival(scene);
+        let progress = self.course.progress(scene.now, position, arrival);
+        if progress == Progress::Arrived && self.course.leg.purpose == Purpose::Move {
             self.stalls = 0;
         }
         progress
@@ -232,13 +273,9 @@ impl Flight {
 
     /// Whether the mission ends here: homing over the terminal, or by a move of the policy into it.
     fn is_home(&self, scene: &Scene<'_>) -> bool {
-        let ends = self.homing.is_some() || self.leg.purpose == Purpose::Move;
-        ends && self.leg.cell == scene.mission.terminal
-    }
-
-    fn is_heard(&self, scene: &Scene<'_>) -> bool {
-        let at = scene.vehicle().heartbeat_at;
-        scene.hears() && at.is_some_and(|at| scene.now.since(at) <= HEARTBEAT_AGE)
+        let leg = &self.course.leg;
+        let ends = self.homing.is_some() || leg.purpose == Purpose::Move;
+        ends && leg.cell == scene.mission.terminal
     }
 
     fn stalled(&mut self, scene: &Scene<'_>, position: &Ned, out: &mut Outputs) -> Outcome {
@@ -258,12 +295,13 @@ impl Flight {
     /// Turns back to the cell under the aircraft, when the target cannot be reached.
     fn turn_back(&mut self, scene: &Scene<'_>, position: &Ned) {
         let may_be = |&cell: &Cell| scene.guard.distance(cell).is_some();
-        let here = self.plan.frame.cell(position).filter(may_be).unwrap_or(self.leg.from);
+        let here = self.plan.frame.cell(position).filter(may_be).unwrap_or(self.course.leg.from);
         let target = self.plan.frame.centre(here, self.plan.down_m);
-        self.leg = Leg::new(scene.now, Purpose::Centre, (here, *position), (here, target));
+        self.course.begin(Leg::new(scene.now, Purpose::Centre, (here, *position), (here, target)));
     }
 
-    /// One decision of the policy, or the reason why the guard goes on alone.
+    /// One decision for the end of the present leg, which the aircraft has reached or will reach: of the policy, of the
+    /// guard on the way home, or the reason why the guard goes on alone.
     fn decide<D: Deliberator>(
         &mut self,
         scene: &Scene<'_>,
@@ -272,11 +310,15 @@ impl Flight {
         policy: &mut D,
         out: &mut Outputs,
     ) -> Outcome {
-        let battery = energy.available(scene);
-        if !scene.guard.is_feasible(self.leg.cell, battery) {
+        if self.homing.is_some() {
+            return self.fly_home(scene, energy, decider, out);
+        }
+        let cell = self.course.leg.cell;
+        let battery = energy.available(scene, self.course.units_ahead());
+        if !scene.guard.is_feasible(cell, battery) {
             return Outcome::GoHome(ReturnReason::Battery);
         }
-        let at = Standpoint { state: State::Engaged, cell: self.leg.cell, battery };
+        let at = Standpoint { state: State::Engaged, cell, battery };
         match decider.ask(scene, at, policy, out) {
             Ok(action) => {
                 self.follow(scene, energy, action);
@@ -295,19 +337,19 @@ impl Flight {
         decider: &mut Decider,
         out: &mut Outputs,
     ) -> Outcome {
-        let cell = self.leg.cell;
-        if !energy.reaches_home(scene, cell) {
+        let (cell, ahead) = (self.course.leg.cell, self.course.units_ahead());
+        if !energy.reaches_home(scene, cell, ahead) {
             if !core::mem::replace(&mut self.warned.short_of_home, true) {
-                let needed = Decimal::<0>(energy.touchdown_percent(scene, cell).unwrap_or(0.0));
+                let needed = Decimal::<0>(energy.touchdown_percent(scene, cell, ahead).unwrap_or(0.0));
                 out.say(Severity::Critical, format_args!("gleaner: battery short of home, {needed} % there"));
             }
-            if energy.must_land(scene) && scene.mission.heights.height_m(cell) == Some(0) {
+            if self.lands_here(scene, energy) {
                 out.say(Severity::Critical, format_args!("gleaner: battery empty, landing at {cell}"));
                 self.landing = Some(Landing::new(scene.now));
                 return Outcome::Stay;
             }
         }
-        let at = Standpoint { state: State::Homing, cell, battery: energy.available(scene) };
+        let at = Standpoint { state: State::Homing, cell, battery: energy.available(scene, ahead) };
         match decider.homeward(scene, at, out) {
             Some(action) => {
                 self.follow(scene, energy, action);
@@ -317,31 +359,16 @@ impl Flight {
         }
     }
 
+    /// Flies an action from the end of the present leg: now if the aircraft is there, else when it will be.
     fn follow(&mut self, scene: &Scene<'_>, energy: &mut Energy, action: Action) {
-        let (from, to) = (self.leg.cell, self.leg.cell.after(action));
-        let ends = ((from, self.leg.target), (to, self.plan.frame.centre(to, self.plan.down_m)));
+        let Leg { cell: from, target, .. } = self.course.leg;
+        let to = from.after(action);
+        let ends = ((from, target), (to, self.plan.frame.centre(to, self.plan.down_m)));
         energy.pay(action);
-        self.leg = match action {
+        let leg = match action {
             Action::Hover => Leg::new(scene.now, Purpose::Hover, ends.0, ends.1).lasting(scene.slot()),
             _ => Leg::new(scene.now, Purpose::Move, ends.0, ends.1),
         };
-    }
-
-    /// `WPNAV_SPEED` has no effect on a guided leg that is under way, the command has. PX4 accepts it without
-    /// effect in OFFBOARD, so it is not requested there.
-    fn keep_speed(&mut self, scene: &Scene<'_>, out: &mut Outputs) {
-        let wanted = scene.inputs.parameters.speed();
-        if scene.vehicle().firmware == Some(Firmware::ArduPilot) && self.speed.requested != Some(wanted) {
-            let wanted_at = *self.speed.wanted_at.get_or_insert(scene.now);
-            if scene.is_ours_since(wanted_at) {
-                self.speed = Speed { requested: Some(wanted), wanted_at: None };
-                out.command = Some(AutopilotCommand::ChangeSpeed(wanted));
-            }
-        }
-        let refused =
-            |end: &(AutopilotCommand, bool)| matches!(end, (AutopilotCommand::ChangeSpeed(_), false));
-        if scene.inputs.ended.iter().any(refused) {
-            out.say(Severity::Warning, format_args!("gleaner: speed not accepted by the autopilot"));
-        }
+        self.course.follow(leg, self.arrival(scene));
     }
 }

@@ -6,7 +6,7 @@ use crate::flight::plan;
 use crate::flight::stream::Stream;
 use crate::scene::Scene;
 use crate::{Missing, Outputs, TakeOver, Vehicle};
-use gleaner_link::{Firmware, FlightMode, Severity};
+use gleaner_link::{Firmware, FlightMode, PositionTarget, Severity};
 use gleaner_units::{Decimal, Duration, Instant, Ned};
 
 /// What is missing is reported at most this often, so that a condition at its edge does not flood the link.
@@ -50,15 +50,15 @@ impl Wait {
     /// PX4 accepts OFFBOARD only when targets stream already: the place of the aircraft, so that the switch moves
     /// nothing; once in OFFBOARD, the place where it then was. ArduPilot needs none. Resumed targets clear a failsafe of
     /// PX4, so there are none while one is set or while heartbeats are no evidence.
-    pub(crate) fn target_due(&mut self, scene: &Scene<'_>) -> Option<Ned> {
+    pub(crate) fn target_due(&mut self, scene: &Scene<'_>) -> Option<PositionTarget> {
         let vehicle = scene.vehicle();
-        if vehicle.firmware != Some(Firmware::Px4) || vehicle.failsafe || !scene.hears() {
+        if vehicle.firmware != Some(Firmware::Px4) || vehicle.failsafe || !scene.is_heard() {
             return None;
         }
         if !vehicle.is_guided() || self.hold.is_none() {
             self.hold = vehicle.position.filter(|_| vehicle.ready);
         }
-        self.stream.due(scene.now, self.hold?, Firmware::Px4)
+        self.stream.due(scene.now, PositionTarget::at(self.hold?), Firmware::Px4)
     }
 
     pub(crate) fn step(&mut self, scene: &Scene<'_>, energy: &Energy, out: &mut Outputs) -> Outcome {

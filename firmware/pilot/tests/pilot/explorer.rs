@@ -70,7 +70,8 @@ impl Judge {
         }
         if let Some(target) = out.setpoint {
             assert!(state.flies() || state == State::Waiting, "a target in {state:?}: {}", path());
-            assert!(target.is_finite());
+            assert!(target.position.is_finite() && target.velocity.unwrap_or_default().is_finite());
+            assert!(state == State::Waiting || !is_old(rig), "a target on old evidence: {}", path());
             let is_px4 = vehicle.firmware == Some(Firmware::Px4);
             assert!(!(is_px4 && vehicle.failsafe), "a target during a failsafe: {}", path());
             assert!(
@@ -92,6 +93,11 @@ impl Judge {
         }
         self.state = state;
     }
+}
+
+/// Whether the last heartbeat is older than a target may be sent on.
+fn is_old(rig: &Rig) -> bool {
+    rig.vehicle.heartbeat_at.is_none_or(|at| rig.now.since(at) > Duration::from_millis(2_500))
 }
 
 /// What distinguishes two machines as far as the rules go.

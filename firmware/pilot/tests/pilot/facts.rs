@@ -109,6 +109,21 @@ fn a_second_engagement_does_not_reopen_the_budget() {
     assert_eq!(rig.policy.asked[asked].uav[1], 30.0);
 }
 
+#[test]
+fn a_restart_of_the_program_does_not_reopen_the_budget() {
+    for (armed, left) in [(true, 18.0), (false, 30.0)] {
+        let mut rig = Rig::new();
+        rig.machine.resume_budget(BatteryUnits(12.0));
+        rig.vehicle.armed = armed;
+        rig.run(1.0);
+        rig.vehicle.armed = true;
+        rig.run(1.0);
+        rig.engage();
+        rig.run(2.0);
+        assert_eq!(rig.policy.asked[0].uav[1], left, "armed at the start: {armed}");
+    }
+}
+
 /// Flies a mission in which a unit really takes `price` percent; the percent left when the landing is requested.
 fn fly_at(price: f32, then: Action) -> (Rig, f32) {
     let mut mission = crate::rig::mission();
@@ -118,12 +133,16 @@ fn fly_at(price: f32, then: Action) -> (Rig, f32) {
     rig.vehicle.battery_percent = Some(90);
     rig.engage();
     rig.policy.then = then;
+    // Targets come with every second poll.
+    let mut last_m = 0.0;
     while rig.commanded(AutopilotCommand::Land) == 0 && left > 0.0 {
-        // 20 polls a second; a cell takes two seconds.
-        let moves = rig.actions.last().is_some_and(|&action| action != Action::Hover);
-        left -= price * if moves { 1.0 } else { 0.5 } / 40.0;
-        rig.vehicle.battery_percent = Some(left.max(0.0) as u8);
+        let before = rig.vehicle.position.unwrap();
         rig.step();
+        let moved_m = rig.vehicle.position.unwrap().horizontal_distance(&before).0;
+        // 20 polls a second; a slot of hovering takes two seconds.
+        let moves = moved_m + std::mem::replace(&mut last_m, moved_m) > 0.0;
+        left -= price * if moves { moved_m / 20.0 } else { 0.5 / 40.0 };
+        rig.vehicle.battery_percent = Some(left.max(0.0) as u8);
     }
     (rig, left)
 }

@@ -1,9 +1,9 @@
 //! The regular flight: decisions, legs, the ledger, landing, what is told.
 
-use crate::rig::{DOWN_M, Rig, TERMINAL, mission};
+use crate::rig::{DOWN_M, Rig, START, TERMINAL, mission};
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode};
 use gleaner_pilot::{Request, State};
-use gleaner_units::{Action, BatteryUnits, Cell, CellSet, Grid, HeightMap, Metres, MetresPerSecond, Ned};
+use gleaner_units::{Action, BatteryUnits, Cell, CellSet, Grid, HeightMap, Metres, MetresPerSecond};
 
 use Action::{East, Hover, North, West};
 
@@ -12,15 +12,17 @@ fn a_mission_flies_cell_by_cell_and_lands_where_a_move_enters_the_terminal() {
     let mut rig = Rig::engaged();
     rig.policy.actions = [North, East, Hover, East, East, North, North, East, East].into();
     rig.run_to(State::Done);
-    let route: Vec<Ned> = rig.setpoints.iter().fold(Vec::new(), |mut route, &(_, target)| {
-        if route.last() != Some(&target) {
-            route.push(target);
+    let route: Vec<Cell> = rig.setpoints.iter().fold(Vec::new(), |mut route, (_, target)| {
+        let cell = rig.frame().cell(target).unwrap();
+        if route.last() != Some(&cell) {
+            route.push(cell);
         }
+        assert_eq!(target.down_m, DOWN_M, "above home, not above the origin");
         route
     });
     let cells = [(1, 1), (1, 2), (2, 2), (3, 2), (4, 2), (4, 3), (4, 4), (5, 4), (6, 4)];
-    assert_eq!(route, cells.map(|(x, y)| rig.centre(Cell::new(x, y))));
-    assert_eq!(route[0].down_m, DOWN_M, "above home, not above the origin");
+    assert_eq!(route, cells.map(|(x, y)| Cell::new(x, y)));
+    assert_eq!(rig.setpoints[0].1, rig.centre(Cell::new(1, 1)));
     assert_eq!(rig.actions, [North, East, Hover, East, East, North, North, East, East]);
     assert_eq!(rig.machine.spent(), BatteryUnits(8.5));
     assert_eq!(rig.commanded(AutopilotCommand::Land), 1);
@@ -40,7 +42,7 @@ fn a_mission_flies_cell_by_cell_and_lands_where_a_move_enters_the_terminal() {
 fn the_ledger_is_what_the_policy_sees() {
     let mut rig = Rig::engaged();
     rig.policy.actions = [North, Hover, East].into();
-    rig.run(12.0);
+    rig.run(18.0);
     let seen: Vec<[f32; 2]> =
         rig.policy.asked.iter().take(4).map(|tokens| [tokens.uav[1], tokens.uav[0]]).collect();
     // Budget 30 (90 % of 100 would be more); spare = battery - distance to (6, 4).
@@ -153,15 +155,57 @@ fn a_landing_that_only_the_mode_confirms_is_a_landing() {
 }
 
 #[test]
-fn ardupilot_gets_targets_on_change_and_once_a_second() {
+fn targets_stream_steadily_once_the_first_cell_is_reached() {
+    for firmware in [Firmware::ArduPilot, Firmware::Px4] {
+        let mut rig = Rig::new();
+        rig.vehicle.firmware = Some(firmware);
+        rig.policy.actions = [East, North, Hover, Hover, East].into();
+        rig.engage();
+        rig.run(20.0);
+        let first = rig.velocities.iter().position(|(_, velocity)| velocity.is_some()).unwrap();
+        assert!(rig.setpoints[first].1.horizontal_distance(&rig.centre(START)).0 < 1.0);
+        assert!(rig.velocities[first..].iter().all(|(_, velocity)| velocity.is_some()));
+        assert!(rig.setpoints[first..].windows(2).all(|pair| pair[1].0 - pair[0].0 <= 100));
+    }
+}
+
+/// The decision for a cell is made while it can still be followed without braking, and for the state in which the
+/// aircraft will be there.
+#[test]
+fn decisions_come_before_arrival_and_straight_on_is_not_braked() {
     let mut rig = Rig::engaged();
-    rig.set("GLN_SPEED", 1.0);
-    rig.run(15.0);
-    assert!(rig.setpoints.windows(2).all(|pair| {
-        let gap_ms = pair[1].0 - pair[0].0;
-        gap_ms == 1_000 || (gap_ms < 1_000 && pair[0].1 != pair[1].1)
-    }));
-    assert!(rig.setpoints.len() <= 17);
+    rig.policy.actions = [East, East, East, East, North].into();
+    let mut seen = Vec::new();
+    while rig.actions.len() < 5 {
+        if rig.step().decided {
+            let decision = rig.machine.decision().unwrap();
+            let away = rig.vehicle.position.unwrap().horizontal_distance(&rig.centre(decision.cell)).0;
+            seen.push((rig.now.as_millis(), decision.cell, decision.battery, away));
+        }
+    }
+    for (index, &(_, cell, battery, away)) in seen.iter().enumerate() {
+        assert_eq!((cell, battery), (Cell::new(1 + index as i16, 1), BatteryUnits(30.0 - index as f32)));
+        assert!(away <= 21.5, "at most one cell ahead: {away}");
+    }
+    assert!(seen[2..].iter().all(|&(.., away)| away > 10.0), "{seen:?}");
+    let seconds = (seen[4].0 - seen[2].0) as f32 / 2e3;
+    assert!(seconds <= 2.0 / 0.9, "{seconds} s for a straight cell of 20 m at 10 m/s");
+}
+
+/// What is still to be flown is not yet taken from the measured charge.
+#[test]
+fn a_decision_ahead_counts_the_measured_charge_on_arrival() {
+    let mut rig = Rig::engaged();
+    rig.vehicle.battery_percent = Some(36);
+    rig.policy.then = North;
+    while rig.actions.len() < 3 {
+        rig.step();
+    }
+    let landing = 60.0 / 1.05 * 0.225;
+    let decision = rig.machine.decision().unwrap();
+    let away = rig.vehicle.position.unwrap().horizontal_distance(&rig.centre(decision.cell)).0;
+    let expected = 37.0 - landing - away / 20.0;
+    assert!((decision.battery.0 - expected).abs() < 0.1, "{} for {expected}", decision.battery.0);
 }
 
 #[test]
@@ -214,9 +258,17 @@ fn small_cells_are_not_cut_short_by_a_large_arrival_radius() {
     rig.set("GLN_ARRIVE_R", 10.0);
     rig.engage();
     rig.policy.then = East;
-    for _ in 0..3 {
-        while !rig.step().decided {}
-        let here = rig.centre(rig.machine.decision().unwrap().cell);
-        assert!(rig.vehicle.position.unwrap().horizontal_distance(&here).0 < 3.0, "in the cell");
+    let (mut decided, mut nearest) = (Vec::new(), [f32::INFINITY; 4]);
+    while decided.len() < 4 {
+        if rig.step().decided {
+            let here = rig.machine.decision().unwrap().cell;
+            let away = rig.vehicle.position.unwrap().horizontal_distance(&rig.centre(here)).0;
+            assert!(away < 7.0, "at most one cell ahead: {away}");
+            decided.push(here);
+        }
+        for (nearest, &cell) in nearest.iter_mut().zip(&decided) {
+            *nearest = nearest.min(rig.vehicle.position.unwrap().horizontal_distance(&rig.centre(cell)).0);
+        }
     }
+    assert!(nearest[..3].iter().all(|&nearest| nearest < 0.5), "over each centre: {nearest:?}");
 }

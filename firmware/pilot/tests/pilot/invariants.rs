@@ -1,7 +1,7 @@
 //! Whatever happens, some things never do: random flights with random trouble, every output checked.
 
 use crate::rig::{DOWN_M, Rig, TERMINAL};
-use gleaner_link::{AutopilotCommand, Firmware, FlightMode};
+use gleaner_link::{AutopilotCommand, Firmware, FlightMode, PositionTarget};
 use gleaner_pilot::{Outputs, Request, State};
 use gleaner_units::{Action, Cell, Duration, Metres, Ned};
 use proptest::prelude::*;
@@ -101,15 +101,18 @@ fn check(rig: &Rig, out: &Outputs, other_mode: bool, preferences: &mut Vec<[f32;
     let state = rig.state();
     let guided = rig.vehicle.is_guided();
     let flying = matches!(state, State::Engaged | State::Homing);
-    if let Some(target) = out.setpoint {
-        assert!(target.is_finite());
+    if let Some(PositionTarget { position: target, velocity }) = out.setpoint {
+        let speed = velocity.unwrap_or_default();
+        assert!(target.is_finite() && speed.is_finite());
         let px4_waits = state == State::Waiting && rig.vehicle.firmware == Some(Firmware::Px4);
         assert!(flying || px4_waits, "a target in {state:?}");
         if flying {
             assert!(guided && !other_mode && rig.vehicle.armed, "a target while someone else steers");
             let cell = rig.frame().cell(&target).expect("inside the grid");
             assert!(rig.mission.fence.contains(cell), "inside the fence");
-            assert_eq!(target, Ned { down_m: target.down_m, ..rig.centre(cell) }, "a centre");
+            assert!(velocity.is_some() || target == Ned { down_m: target.down_m, ..rig.centre(cell) });
+            let mps = speed.north_mps.hypot(speed.east_mps);
+            assert!(mps <= rig.parameters.speed().0 + 1e-3 && speed.down_mps == 0.0, "{mps} m/s");
             assert!((target.down_m - DOWN_M).abs() < 3.5, "the altitude at which it was engaged");
         }
     }

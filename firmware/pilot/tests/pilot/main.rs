@@ -12,6 +12,7 @@ mod mission;
 #[cfg(feature = "std")]
 mod mission_file;
 mod onboard;
+mod real_autopilots;
 mod rig;
 mod start;
 mod take_over;

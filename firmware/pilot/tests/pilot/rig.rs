@@ -1,7 +1,7 @@
 //! A machine in virtual time, with an aircraft that flies to the last target in a straight line.
 
 use gleaner_guard::Guard;
-use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters};
+use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters, Velocity};
 use gleaner_pilot::{
     DeviceSite, Devices, Inputs, LookingAhead, Machine, Mission, Outputs, RadioActivity, Request, Rules,
     State, Telemetry, Vehicle,
@@ -110,6 +110,8 @@ pub struct Rig {
     pub target: Option<Ned>,
     pub texts: Vec<String>,
     pub setpoints: Vec<(u64, Ned)>,
+    /// The velocities of the setpoints.
+    pub velocities: Vec<(u64, Option<Velocity>)>,
     pub commands: Vec<(u64, AutopilotCommand)>,
     pub actions: Vec<Action>,
 }
@@ -168,6 +170,7 @@ impl Rig {
             target: None,
             texts: Vec::new(),
             setpoints: Vec::new(),
+            velocities: Vec::new(),
             commands: Vec::new(),
             actions: Vec::new(),
         };
@@ -223,6 +226,7 @@ impl Rig {
             rules: &self.rules,
             requests: &requests,
             foreign_target: self.foreign_target,
+            target_reported: false,
             other_mode_seen: std::mem::take(&mut self.other_mode_seen),
             ended: &ended,
             engage_inhibited: self.engage_inhibited,
@@ -238,8 +242,9 @@ impl Rig {
             // The link compares only what is sent in our mode; a target after a revocation is a new beginning.
             let begins = std::mem::take(&mut self.revoked) || !self.vehicle.is_guided();
             self.foreign_target &= !begins;
-            self.target = Some(target);
-            self.setpoints.push((at_ms, target));
+            self.target = Some(target.position);
+            self.setpoints.push((at_ms, target.position));
+            self.velocities.push((at_ms, target.velocity));
         }
         if let Some(command) = out.command {
             self.commands.push((at_ms, command));
@@ -325,7 +330,7 @@ impl Rig {
         if !(self.obeys && self.vehicle.armed && self.vehicle.is_guided()) {
             return;
         }
-        if self.dropped.is_some_and(|cell| self.centre(cell) == target) {
+        if self.dropped.is_some_and(|cell| self.frame().cell(&target) == Some(cell)) {
             return;
         }
         let distance_m = position.horizontal_distance(&target).0;

@@ -14,7 +14,7 @@ use custody::Custody;
 use envelope::Envelope;
 use gleaner_link::Frame;
 use gleaner_pilot::{DecisionRecord, Parameters, State};
-use gleaner_units::{BatteryUnits, Duration, GridFrame, Instant};
+use gleaner_units::{BatteryUnits, Cell, Duration, GridFrame, Instant, Ned};
 
 /// The referee of one flight.
 #[derive(Clone, Debug)]
@@ -35,6 +35,8 @@ pub struct Referee {
     energy: BatteryUnits,
     decisions: u32,
     expected: Option<u32>,
+    /// The cell in which the last flown decision ends.
+    leads_to: Option<Cell>,
     /// Whether the pilot's decisions are being flown.
     flying: bool,
     /// Injected errors of the position, during which place is not judged.
@@ -50,6 +52,7 @@ pub struct Referee {
 #[derive(Clone, Copy, Debug, Default)]
 struct Excursions {
     map: bool,
+    fence: bool,
     altitude: bool,
     pack: bool,
     number: bool,
@@ -59,6 +62,10 @@ impl Referee {
     /// Between a position and the decision made of it lies one interval of the 10 Hz stream: a metre at 10 m/s. Half a
     /// metre more for the steps of the simulation.
     const POSITION_AGE_M: f32 = 1.5;
+    /// How far the aircraft may be behind the moving target when the pilot decides ahead, m.
+    const LAG_M: f32 = 3.0;
+    /// How far a forbidden cell may be entered: the overshoot of a stop.
+    const OVERSHOOT_M: f32 = 2.0;
     /// The pilot holds its altitude within centimetres; a climb to it ends within 3 m.
     const ALTITUDE_BAND_M: f32 = 5.0;
     /// A gust or a loss of thrust may push the aircraft out of the band for so long, s.
@@ -83,6 +90,7 @@ impl Referee {
             energy: BatteryUnits(0.0),
             decisions: 0,
             expected: None,
+            leads_to: None,
             flying: false,
             disturbed_until: Instant::ZERO,
             off_altitude_since: None,
@@ -122,6 +130,7 @@ impl Referee {
     pub fn companion_restarts(&mut self) {
         self.custody.restarted();
         self.expected = None;
+        self.leads_to = None;
         self.flying = false;
     }
 
@@ -180,8 +189,13 @@ impl Referee {
     fn judge_place(&mut self, now: Instant, record: &DecisionRecord, truth: &Truth) {
         let centre = self.frame.centre(record.cell, truth.position.down_m);
         let off_m = truth.position.horizontal_distance(&centre).0;
-        let radius_m = self.parameters.arrive_radius().0.min(self.frame.grid().cell().0 / 2.0);
-        let allowed_m = radius_m + Referee::POSITION_AGE_M + 5.0 * self.wander_m;
+        let cell_m = self.frame.grid().cell().0;
+        let radius_m = self.parameters.arrive_radius().0.min(cell_m / 2.0);
+        // The decision for the cell that the last one leads to may be made on the way there: one cell ahead.
+        let is_ahead = self.leads_to == Some(record.cell);
+        let reach_m = if is_ahead { cell_m + Referee::LAG_M } else { radius_m };
+        let allowed_m = reach_m + Referee::POSITION_AGE_M + 5.0 * self.wander_m;
+        self.leads_to = Some(record.cell.after(record.action));
         if off_m > allowed_m && now >= self.disturbed_until {
             self.violated(now, Rule::NotThere { claimed: record.cell, off_m });
         }
@@ -230,8 +244,8 @@ impl Referee {
         }
     }
 
-    /// The pilot flies from cell centre to cell centre, so it keeps half a cell from the edge of the map by itself. Half
-    /// a cell outside the map is a whole cell off.
+    /// The pilot flies from cell centre to cell centre, so it keeps half a cell from the edge of the map and from forbidden
+    /// cells by itself. Half a cell outside the map is a whole cell off.
     fn watch_place(&mut self, now: Instant, truth: &Truth) {
         let (grid, point) = (self.frame.grid(), self.frame.point(&truth.position));
         let cell_m = grid.cell().0;
@@ -241,6 +255,7 @@ impl Referee {
             self.violated(now, Rule::OutsideMap);
         }
         self.excursions.map = outside;
+        self.watch_fence(now, &truth.position);
         let height_m = truth.height_m;
         let off = (height_m - self.parameters.altitude().0).abs() > Referee::ALTITUDE_BAND_M;
         self.off_altitude_since = if off { self.off_altitude_since.or(Some(now)) } else { None };
@@ -249,6 +264,22 @@ impl Referee {
             self.violated(now, Rule::Altitude { height_m });
         }
         self.excursions.altitude = too_long;
+    }
+
+    /// Forbidden cells inside the map, less an overshoot at the edge.
+    fn watch_fence(&mut self, now: Instant, position: &Ned) {
+        let margin_m = Referee::OVERSHOOT_M + 5.0 * self.wander_m;
+        let reach = [(0.0, 0.0), (margin_m, 0.0), (-margin_m, 0.0), (0.0, margin_m), (0.0, -margin_m)];
+        let is_allowed = |(north_m, east_m): (f32, f32)| {
+            let near =
+                Ned { north_m: position.north_m + north_m, east_m: position.east_m + east_m, ..*position };
+            self.frame.cell(&near).is_none_or(|cell| self.envelope.moves(cell).is_some())
+        };
+        let forbidden = !reach.into_iter().any(is_allowed);
+        if forbidden && !self.excursions.fence {
+            self.violated(now, Rule::OverForbiddenCell { cell: self.frame.cell(position) });
+        }
+        self.excursions.fence = forbidden;
     }
 
     fn judge_landing(&mut self, now: Instant, truth: &Truth) {

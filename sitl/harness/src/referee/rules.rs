@@ -15,7 +15,7 @@ pub struct Violation {
 /// The rules, by how they are broken.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Rule {
-    /// A decision was made for a cell that the aircraft is not in.
+    /// A decision was made for a cell that the aircraft is neither in nor about to reach.
     NotThere {
         /// The cell of the decision.
         claimed: Cell,
@@ -47,6 +47,11 @@ pub enum Rule {
     },
     /// The aircraft left the map while the pilot flew it.
     OutsideMap,
+    /// The aircraft was over a cell outside the fence while the pilot flew it.
+    OverForbiddenCell {
+        /// The cell under it, if any.
+        cell: Option<Cell>,
+    },
     /// The aircraft left its altitude for longer than a correction takes while the pilot flew it.
     Altitude {
         /// Above home, m.
@@ -97,6 +102,8 @@ impl fmt::Display for Rule {
                 write!(f, "decision {came} came where {expected} was due")
             }
             Rule::OutsideMap => write!(f, "left the map"),
+            Rule::OverForbiddenCell { cell: Some(cell) } => write!(f, "flew over the forbidden cell {cell}"),
+            Rule::OverForbiddenCell { cell: None } => write!(f, "flew over a forbidden cell"),
             Rule::Altitude { height_m } => write!(f, "left its altitude, now {height_m:.1} m"),
             Rule::PackEmpty => write!(f, "the battery is empty in flight"),
             Rule::LandedElsewhere { cell: Some(cell) } => write!(f, "landed in cell {cell}"),

@@ -229,25 +229,46 @@ fn the_envelope_agrees_with_hand_counts() {
 fn an_empty_pack_counts_only_if_the_way_home_was_covered() {
     for (battery, broken) in [(100.0, true), (20.0, false)] {
         let mut stand = Stand::engaged(AutopilotKind::ArduPilot);
-        let truth = Truth {
-            position: Ned::default(),
-            ground_speed_mps: 0.0,
-            height_m: 60.0,
-            armed: true,
-            on_ground: false,
-            mode: VehicleMode::Guided,
-            mode_by: Commander::Operator,
-            target_by: None,
-            battery: BatteryUnits(battery),
-            killed_by_nan: false,
-            is_up: true,
-            ignored_targets: 0,
-        };
-        let start = stand.referee.frame.centre(Cell::new(10, 6), 0.0);
-        let truth = Truth { position: start, ..truth };
+        let truth = Truth { battery: BatteryUnits(battery), ..over(&stand, Cell::new(10, 6), 0.0) };
         stand.referee.could_return = stand.referee.covers_return(&truth);
         stand.referee.flying = true;
         stand.referee.watch(at(20_000), &Truth { battery: BatteryUnits(0.0), ..truth });
         assert_eq!(stand.rules().contains(&Rule::PackEmpty), broken);
+    }
+}
+
+/// An aircraft in GUIDED, `east_m` east of the centre of `cell`.
+fn over(stand: &Stand, cell: Cell, east_m: f32) -> Truth {
+    let centre = stand.referee.frame.centre(cell, 0.0);
+    Truth {
+        position: Ned { east_m: centre.east_m + east_m, ..centre },
+        ground_speed_mps: 0.0,
+        height_m: 60.0,
+        armed: true,
+        on_ground: false,
+        mode: VehicleMode::Guided,
+        mode_by: Commander::Operator,
+        target_by: None,
+        battery: BatteryUnits(90.0),
+        killed_by_nan: false,
+        is_up: true,
+        ignored_targets: 0,
+    }
+}
+
+#[test]
+fn a_forbidden_cell_may_be_entered_by_an_overshoot_only() {
+    let plan = MissionPlan::new(ScenarioKind::ReachDestination, 4);
+    let mut setup = MissionSetup::new(Arc::new(World::default_world()), plan).unwrap();
+    let forbidden = Cell::new(12, 6);
+    setup.mission.fence.remove(forbidden);
+    for (east_m, broken) in [(-9.0, false), (-7.0, true), (0.0, true), (11.0, false)] {
+        let mut stand = Stand::engaged(AutopilotKind::ArduPilot);
+        stand.referee.envelope = Envelope::new(&setup.mission);
+        stand.referee.flying = true;
+        let truth = over(&stand, forbidden, east_m);
+        stand.referee.watch(at(20_000), &truth);
+        let rule = Rule::OverForbiddenCell { cell: Some(forbidden) };
+        assert_eq!(stand.rules().contains(&rule), broken, "{east_m} m");
     }
 }
