@@ -1,15 +1,17 @@
-//! `last_run.toml`: what the run was doing, written at every change of state. The next run reads how it ended.
+//! `last_run.toml`: what the run was doing, written at every change of state and after every decision. The next run reads
+//! how it ended and how much of the mission's battery it used.
 
 use super::atomic::{Replacer, replace};
 use gleaner_link::Severity;
 use gleaner_pilot::State;
+use gleaner_units::BatteryUnits;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The file's content.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Note {
     /// Start of the run, seconds since 1970.
     run_s: u64,
@@ -19,19 +21,34 @@ struct Note {
     state: String,
     /// Whether the run ended as asked.
     ended: bool,
+    /// Battery units that the mission used.
+    #[serde(default)]
+    spent_units: f32,
     /// The panic that ended it.
     #[serde(skip_serializing_if = "Option::is_none")]
     panic: Option<String>,
 }
 
-/// How the last run ended, if it did not end as asked.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// How the last run ended.
+#[derive(Clone, Debug, PartialEq)]
 pub struct LastRun {
     state: String,
     panic: Option<String>,
+    ended: bool,
+    spent: BatteryUnits,
 }
 
 impl LastRun {
+    /// Whether it ended as asked.
+    pub fn ended(&self) -> bool {
+        self.ended
+    }
+
+    /// Battery units that its mission used. The next run continues with the rest while the motors stay armed.
+    pub fn spent(&self) -> BatteryUnits {
+        self.spent
+    }
+
     /// A run that ended while it had the aircraft is critical.
     pub fn severity(&self) -> Severity {
         let flying =
@@ -57,7 +74,7 @@ impl fmt::Display for LastRun {
 pub struct LastRunFile {
     path: PathBuf,
     run_s: u64,
-    written: Option<State>,
+    written: Option<(State, BatteryUnits)>,
     replacer: Replacer,
 }
 
@@ -71,22 +88,23 @@ impl LastRunFile {
         (LastRunFile { path, run_s, written: None, replacer }, last)
     }
 
-    /// Notes the state when it has changed. Never waits. Returns the fault of an earlier write.
-    pub fn note(&mut self, state: State, at_s: u64) -> Option<std::io::Error> {
-        if self.written != Some(state) {
-            self.written = Some(state);
-            self.replacer.put(text(&self.at(state, at_s)));
+    /// Notes the state and the battery used when they have changed. Never waits. Returns the fault of an earlier write.
+    pub fn note(&mut self, state: State, spent: BatteryUnits, at_s: u64) -> Option<std::io::Error> {
+        if self.written != Some((state, spent)) {
+            self.written = Some((state, spent));
+            self.replacer.put(text(&self.at(state, spent, at_s)));
         }
         self.replacer.error()
     }
 
-    fn at(&self, state: State, at_s: u64) -> Note {
-        Note { run_s: self.run_s, at_s, state: state.name().to_owned(), ended: false, panic: None }
+    fn at(&self, state: State, spent: BatteryUnits, at_s: u64) -> Note {
+        let state = state.name().to_owned();
+        Note { run_s: self.run_s, at_s, state, ended: false, spent_units: spent.0, panic: None }
     }
 
     /// The run ends as asked.
-    pub fn close(self, state: State, at_s: u64) {
-        let note = Note { ended: true, ..self.at(state, at_s) };
+    pub fn close(self, state: State, spent: BatteryUnits, at_s: u64) {
+        let note = Note { ended: true, ..self.at(state, spent, at_s) };
         self.replacer.close();
         if let Err(error) = replace(&self.path, text(&note).as_bytes()) {
             tracing::warn!("{}: {error}: the next run will report an interrupted run", self.path.display());
@@ -96,7 +114,8 @@ impl LastRunFile {
 
 fn read(path: &Path) -> Option<LastRun> {
     let note: Note = toml::from_str(&fs::read_to_string(path).ok()?).ok()?;
-    (!note.ended).then_some(LastRun { state: note.state, panic: note.panic })
+    let spent = BatteryUnits(note.spent_units);
+    Some(LastRun { state: note.state, panic: note.panic, ended: note.ended, spent })
 }
 
 fn text(note: &Note) -> String {
@@ -122,29 +141,39 @@ fn note_panics(path: PathBuf, run_s: u64) {
 mod tests {
     use super::*;
 
-    fn ended(folder: &Path, state: State, ended: bool) -> Option<LastRun> {
+    fn ended(folder: &Path, state: State, ended: bool) -> LastRun {
         let path = folder.join("last_run.toml");
-        let note = Note { run_s: 1, at_s: 2, state: state.name().into(), ended, panic: None };
+        let note =
+            Note { run_s: 1, at_s: 2, state: state.name().into(), ended, spent_units: 7.5, panic: None };
         fs::write(&path, text(&note)).unwrap();
-        read(&path)
+        read(&path).unwrap()
     }
 
     #[test]
     fn a_run_that_was_cut_off_in_flight_is_critical() {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(read(&folder.path().join("last_run.toml")), None);
-        assert_eq!(ended(folder.path(), State::Engaged, true), None);
-        let last = ended(folder.path(), State::Engaged, false).unwrap();
+        assert!(ended(folder.path(), State::Engaged, true).ended());
+        let last = ended(folder.path(), State::Engaged, false);
+        assert_eq!((last.ended(), last.spent()), (false, BatteryUnits(7.5)));
         assert_eq!(
             (last.severity(), last.to_string().as_str()),
             (Severity::Critical, "last run was cut off while engaged")
         );
-        let last = ended(folder.path(), State::Idle, false).unwrap();
+        let last = ended(folder.path(), State::Idle, false);
         assert_eq!(last.severity(), Severity::Warning);
         for state in State::ALL {
-            let last = LastRun { state: state.name().into(), panic: Some(String::new()) };
+            let last = LastRun { panic: Some(String::new()), ..ended(folder.path(), state, false) };
             assert!(format!("gleaner: {last}").len() <= 50);
         }
+    }
+
+    #[test]
+    fn a_note_of_an_older_program_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("last_run.toml");
+        fs::write(&path, "run_s = 1\nat_s = 2\nstate = \"idle\"\nended = true\n").unwrap();
+        assert_eq!(read(&path).unwrap().spent(), BatteryUnits(0.0));
     }
 
     #[test]
@@ -153,12 +182,15 @@ mod tests {
         let path = folder.path().join("last_run.toml");
         let replacer = Replacer::start(path.clone());
         let mut file = LastRunFile { path: path.clone(), run_s: 5, written: None, replacer };
-        file.note(State::Idle, 6);
-        file.note(State::Engaged, 7);
+        file.note(State::Idle, BatteryUnits(0.0), 6);
+        file.note(State::Engaged, BatteryUnits(0.0), 7);
+        file.note(State::Engaged, BatteryUnits(1.5), 7);
         file.replacer.close();
-        assert_eq!(read(&path).unwrap().state, "engaged");
+        let last = read(&path).unwrap();
+        assert_eq!((last.state.as_str(), last.spent()), ("engaged", BatteryUnits(1.5)));
         let replacer = Replacer::start(path.clone());
-        LastRunFile { path: path.clone(), run_s: 5, written: None, replacer }.close(State::Engaged, 8);
-        assert_eq!(read(&path), None);
+        let file = LastRunFile { path: path.clone(), run_s: 5, written: None, replacer };
+        file.close(State::Engaged, BatteryUnits(2.0), 8);
+        assert!(read(&path).unwrap().ended());
     }
 }

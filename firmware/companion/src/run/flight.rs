@@ -81,6 +81,10 @@ impl Flight {
     /// Reports a last run that did not end as asked.
     fn report_last_run(&mut self) {
         let Some(last) = self.kept.as_mut().and_then(|kept| kept.last_run.take()) else { return };
+        self.onboard.resume_budget(last.spent());
+        if last.ended() {
+            return;
+        }
         if let Some(panic) = last.panic() {
             tracing::error!("the last run ended with {panic}");
         }
@@ -183,9 +187,11 @@ impl Flight {
 
     fn keep(&mut self, now: Instant) {
         let Some(kept) = &mut self.kept else { return };
-        let state = self.onboard.state();
-        let faults =
-            [kept.parameters.poll(now, self.onboard.parameters()), kept.this_run.note(state, unix_time_s())];
+        let (state, spent) = (self.onboard.state(), self.onboard.machine().spent());
+        let faults = [
+            kept.parameters.poll(now, self.onboard.parameters()),
+            kept.this_run.note(state, spent, unix_time_s()),
+        ];
         for fault in faults.into_iter().flatten() {
             tracing::warn!("state folder: {fault}: parameters set from the ground may be lost");
             self.onboard.say(Severity::Warning, format_args!("gleaner: cannot save parameters"));
@@ -304,7 +310,8 @@ impl Flight {
         }
         if let Some(kept) = self.kept {
             kept.parameters.close();
-            kept.this_run.close(self.onboard.state(), unix_time_s());
+            let spent = self.onboard.machine().spent();
+            kept.this_run.close(self.onboard.state(), spent, unix_time_s());
         }
         self.links.close();
         self.logs.close();
