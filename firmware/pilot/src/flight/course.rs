@@ -137,11 +137,10 @@ impl Course {
     pub(crate) fn stopping(&self, position: Ned) -> (Ned, f32) {
         let speed = self.track.speed_mps();
         let half_m = 0.5 * (speed * COASTING_S + speed * speed / (2.0 * STOPPING_MPS2));
-        let velocity = self.track.target(&self.way()).velocity.unwrap_or_default();
-        let ahead = if speed > 0.0 { half_m / speed } else { 0.0 };
+        let [north, east] = self.track.direction(&self.way());
         let middle = Ned {
-            north_m: position.north_m + ahead * velocity.north_mps,
-            east_m: position.east_m + ahead * velocity.east_mps,
+            north_m: position.north_m + half_m * north,
+            east_m: position.east_m + half_m * east,
             ..position
         };
         (middle, half_m)

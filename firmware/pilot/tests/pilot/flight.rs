@@ -26,7 +26,7 @@ fn a_mission_flies_cell_by_cell_and_lands_where_a_move_enters_the_terminal() {
     assert_eq!(rig.actions, [North, East, Hover, East, East, North, North, East, East]);
     assert_eq!(rig.machine.spent(), BatteryUnits(8.5));
     assert_eq!(rig.commanded(AutopilotCommand::Land), 1);
-    assert_eq!(rig.commanded(AutopilotCommand::ChangeSpeed(MetresPerSecond(10.0))), 1);
+    assert_eq!(rig.commanded(AutopilotCommand::ChangeSpeed(MetresPerSecond(12.0))), 1);
     assert!(!rig.machine.landed());
     let silent_from = rig.setpoints.len();
     rig.run(5.0);
@@ -116,7 +116,7 @@ fn a_changed_speed_is_asked_for_again_on_ardupilot_only() {
         rig.run(1.0);
         rig.set("GLN_SPEED", 6.0);
         rig.run(5.0);
-        assert_eq!(rig.commanded(AutopilotCommand::ChangeSpeed(MetresPerSecond(6.0))), asked);
+        assert_eq!(rig.commanded(AutopilotCommand::ChangeSpeed(MetresPerSecond(8.0))), asked);
     }
 }
 
