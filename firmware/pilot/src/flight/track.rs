@@ -18,9 +18,9 @@ use super::leg::{Leg, Purpose};
 use gleaner_link::{PositionTarget, Velocity};
 use gleaner_units::Ned;
 
-/// Acceleration of the target on the way and in turns, m/s^2. Less than ArduCopter's `WPNAV_ACCEL` of 2.5; from 9.4 m/s
+/// Acceleration of the target on the way and in turns, m/s^2. Less than ArduCopter's `WPNAV_ACCEL` of 2.5; from 8.9 m/s
 /// it stops within a cell of 20 m.
-const ACCELERATION_MPS2: f32 = 2.2;
+const ACCELERATION_MPS2: f32 = 2.0;
 /// Braking when the speed must fall at once, m/s^2.
 const HARD_BRAKING_MPS2: f32 = 4.0;
 /// From this distance between target and aircraft on the target slows down, m: a position is up to 0.1 s old, and PX4
@@ -31,7 +31,7 @@ const LAG_MAX_M: f32 = 8.0;
 /// A decision is made this long before braking would begin, s.
 const REACTION_S: f32 = 0.25;
 /// The autopilots answer a velocity so much late, s: a braking target sends the velocity that it will have then.
-const LEAD_S: f32 = 0.2;
+const LEAD_S: f32 = 0.3;
 /// The longest time between two polls that the target moves on for, s.
 const STEP_MAX_S: f32 = 0.2;
 /// Cosine of the angle from which on a leg goes straight on.
