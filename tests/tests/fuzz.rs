@@ -5,12 +5,28 @@ use gleaner_units::Db;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+#[path = "../../fuzz/bodies/city_file.rs"]
+mod city_file;
+#[path = "../../fuzz/bodies/decision_log.rs"]
+mod decision_log;
 #[path = "../../fuzz/bodies/mavlink_stream.rs"]
 mod mavlink_stream;
+#[path = "../../fuzz/bodies/mission_file.rs"]
+mod mission_file;
+#[path = "../../fuzz/bodies/mission_image.rs"]
+mod mission_image;
+#[path = "../../fuzz/bodies/model_blob.rs"]
+mod model_blob;
+#[path = "../../fuzz/bodies/onnx_file.rs"]
+mod onnx_file;
+#[path = "../../fuzz/bodies/parameter_store.rs"]
+mod parameter_store;
 #[path = "../../fuzz/bodies/radio_frame.rs"]
 mod radio_frame;
 
 const INPUTS: u64 = 3_000;
+/// For files of hundreds of kilobytes.
+const LARGE_INPUTS: u64 = 150;
 
 /// The golden packets of the link crate.
 fn packets() -> Vec<Vec<u8>> {
@@ -55,6 +71,105 @@ fn input(seed: u64, valid: &[Vec<u8>]) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// One of `valid`, cut, with parts repeated or left out, and some bytes changed.
+fn damaged(seed: u64, valid: &[Vec<u8>]) -> Vec<u8> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut bytes = valid[rng.random_range(0..valid.len())].clone();
+    for _ in 0..rng.random_range(0..4) {
+        let (at, length) = (rng.random_range(0..bytes.len()), rng.random_range(1..40));
+        let part = bytes[at..bytes.len().min(at + length)].to_vec();
+        match rng.random_range(0..4) {
+            0 => bytes.truncate(at.max(1)),
+            1 => drop(bytes.splice(at..at + part.len(), [])),
+            2 => drop(bytes.splice(at..at, part)),
+            _ => bytes[at] = rng.random(),
+        }
+        if bytes.is_empty() {
+            bytes.push(rng.random());
+        }
+    }
+    bytes
+}
+
+fn file(path: &str) -> Vec<u8> {
+    let path = gleaner_tests::programs::repository().join(path);
+    std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// The missions and cities of the harness's tests.
+fn field_files(name: &str) -> Vec<Vec<u8>> {
+    [
+        "03-excel-semicolon",
+        "04-empty-cells",
+        "05-lidar-decimals",
+        "06-bom-csv",
+        "07-trailing-commas",
+        "08-nodata",
+    ]
+    .map(|case| file(&format!("sitl/harness/tests/data/{case}/{name}")))
+    .to_vec()
+}
+
+/// A mission for the city of 4 x 3 cells that the target offers.
+fn small_mission() -> gleaner_pilot::Mission {
+    use gleaner_pilot::{DeviceSite, Mission};
+    use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap, Metres};
+    let grid = Grid::new(4, 3, Metres(20.0)).unwrap();
+    let corner = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 };
+    let site = DeviceSite { id: 7, cell: Cell::new(2, 1), data: 6000.0 };
+    Mission {
+        heights: HeightMap::flat(grid),
+        fence: CellSet::full(grid),
+        pose: GridPose { corner, rotation: Degrees(0.0) },
+        terminal: Cell::new(0, 0),
+        budget: BatteryUnits(30.0),
+        devices: [site].into_iter().collect(),
+    }
+}
+
+#[test]
+fn model_blobs() {
+    let valid = [file("models/gleaner.gln")];
+    (0..LARGE_INPUTS).for_each(|seed| model_blob::run(&damaged(seed, &valid)));
+}
+
+#[test]
+fn onnx_files() {
+    let valid = [file("models/gleaner.onnx")];
+    (0..LARGE_INPUTS).for_each(|seed| onnx_file::run(&damaged(seed, &valid)));
+}
+
+#[test]
+fn mission_files() {
+    let mut valid = field_files("mission.toml");
+    valid.push(gleaner_pilot::mission_file::write(&small_mission(), "city.csv").into_bytes());
+    (0..INPUTS).for_each(|seed| mission_file::run(&damaged(seed, &valid)));
+}
+
+#[test]
+fn mission_images() {
+    let valid = [gleaner_pilot::mission_image::encode(&small_mission()).to_vec()];
+    (0..INPUTS).for_each(|seed| mission_image::run(&damaged(seed, &valid)));
+}
+
+#[test]
+fn city_files() {
+    let valid = field_files("city.csv");
+    (0..INPUTS).for_each(|seed| city_file::run(&damaged(seed, &valid)));
+}
+
+#[test]
+fn decision_logs() {
+    let valid = [file("tests/data/decisions.jsonl")];
+    (0..INPUTS).for_each(|seed| decision_log::run(&damaged(seed, &valid)));
+}
+
+#[test]
+fn parameter_stores() {
+    let valid = [vec![0xFF; 1024], vec![0; 1024], [*b"GLNP", [1, 0, 10, 0]].concat().repeat(100)];
+    (0..INPUTS).for_each(|seed| parameter_store::run(&damaged(seed, &valid)));
 }
 
 #[test]

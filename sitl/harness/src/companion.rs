@@ -152,6 +152,10 @@ impl<P: Deliberator> Computer<P> {
             }
         }
     }
+
+    fn is_stalled(&self, now: Instant) -> bool {
+        now < self.stalled_until
+    }
 }
 
 impl<P: Deliberator> Companion for Computer<P> {
@@ -162,25 +166,25 @@ impl<P: Deliberator> Companion for Computer<P> {
         }
         let frames = simulation.to_companion();
         let reports = simulation.radio();
-        let Some(mut onboard) = self.onboard.take() else { return };
-        if now < self.stalled_until {
+        if self.onboard.is_some() && self.is_stalled(now) {
             self.keep(now, frames);
-        } else {
-            for (at, frame) in self.waiting.drain(..) {
-                simulation.delivered(at, &frame);
-                onboard.receive_link(now, &frame);
-            }
-            self.waiting_bytes = 0;
-            for frame in frames {
-                simulation.delivered(now, &frame);
-                onboard.receive_link(now, &frame);
-            }
-            for report in reports {
-                onboard.receive_radio(now, &encode(&report));
-            }
-            turn(&mut onboard, simulation, now);
+            return;
         }
-        self.onboard = Some(onboard);
+        // By reference: a pilot is tens of kilobytes.
+        let Some(onboard) = &mut self.onboard else { return };
+        for (at, frame) in self.waiting.drain(..) {
+            simulation.delivered(at, &frame);
+            onboard.receive_link(now, &frame);
+        }
+        self.waiting_bytes = 0;
+        for frame in frames {
+            simulation.delivered(now, &frame);
+            onboard.receive_link(now, &frame);
+        }
+        for report in reports {
+            onboard.receive_radio(now, &encode(&report));
+        }
+        turn(onboard, simulation, now);
     }
 
     fn inject(&mut self, simulation: &mut Simulation, now: Instant, fault: ComputerFault) {

@@ -20,7 +20,7 @@ pub enum Intrusion {
     /// A second ground station (system 250) sends its own position target once a second: metres north and east of
     /// the aircraft's take-off point.
     OtherStation([f32; 2]),
-    /// A station that is not on the allow-list (system 66) commands the pilot: engage, off, return, preference,
+    /// A station that is not on the allow-list (system 66, component 25) commands the pilot: engage, off, return, preference,
     /// `GLN_ENABLE`, broadcast and addressed; between them broken frames and an unknown message whose payload is a
     /// complete engage command.
     Hostile,
@@ -43,6 +43,9 @@ impl fmt::Display for Intrusion {
         }
     }
 }
+
+/// `MAV_COMP_ID_USER1`: no ground station has it. Component 190 of any system may command by default.
+const USER_COMPONENT: u8 = 25;
 
 /// Where a frame enters the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +84,7 @@ impl Intruder {
         let address = match intrusion {
             Intrusion::SecondVehicle => Address::new(2, 1),
             Intrusion::OtherStation(_) => Address::new(250, 190),
-            Intrusion::Hostile => Address::new(66, 190),
+            Intrusion::Hostile => Address::new(66, USER_COMPONENT),
             Intrusion::ParameterStorm | Intrusion::Retransmission => Address::new(255, 190),
         };
         Intruder {

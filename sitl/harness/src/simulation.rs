@@ -244,12 +244,16 @@ impl Simulation {
                 self.referee.disturbed_until(self.now + lasts + SETTLING)
             }
             AircraftFault::OriginShift(_) => self.referee.disturbed_until(self.now + SETTLING),
-            AircraftFault::Consumption(factor) => self.referee.price_changes(factor),
+            AircraftFault::Consumption(factor) => {
+                let truth = self.truth();
+                self.referee.price_changes(factor, &truth);
+            }
             AircraftFault::Wind(wind) => {
                 let [north, east] = wind.velocity_mps;
                 let squared = north * north + east * east + 2.0 * wind.gust_mps * wind.gust_mps;
                 let doubling = self.setup.aircraft.pack.doubling_mps;
-                self.referee.price_changes(1.0 + squared / (doubling * doubling));
+                let truth = self.truth();
+                self.referee.price_changes(1.0 + squared / (doubling * doubling), &truth);
             }
             _ => {}
         }

@@ -1,8 +1,8 @@
 //! Whole missions through real MAVLink bytes, flown by simple policies.
 
 use gleaner_harness::{
-    AircraftFault, AutopilotKind, Ending, FlightResult, FlightScript, Incident, IncidentKind, LineFault,
-    MissionPlan, MissionSetup, RadioFault, Switch, VehicleMode, fly, trajectory,
+    AircraftFault, AutopilotKind, ComputerFault, Ending, FlightResult, FlightScript, Incident, IncidentKind,
+    LineFault, MissionPlan, MissionSetup, RadioFault, Switch, VehicleMode, fly, trajectory,
 };
 use gleaner_pilot::{Budget, Deliberator, LoggedDecision, LookAheadReplay, LookingAhead, Replayed, State};
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
@@ -355,4 +355,37 @@ fn a_flight_with_lookahead_lands_and_its_log_replays() {
         count += 1;
     }
     assert!(count > 20, "{count}");
+}
+
+/// The program does not run for 3.5 s, as after SIGSTOP, and the human pilot selects HOLD (LOITER) late in that time: its
+/// heartbeat waits behind seconds of older messages.
+#[test]
+fn a_take_over_during_a_stall_is_respected_on_both_autopilots() {
+    let at = |millis, kind| Incident { after: Duration::from_millis(millis), kind };
+    let stall = IncidentKind::Computer(ComputerFault::Stall(Duration::from_millis(3_500)));
+    for autopilot in [AutopilotKind::ArduPilot, AutopilotKind::Px4] {
+        let taken = at(23_000, IncidentKind::pilot_selects(VehicleMode::Hold));
+        for (incidents, mode) in [
+            (vec![at(20_000, stall), taken], VehicleMode::Hold),
+            (vec![at(20_000, stall)], VehicleMode::Return),
+        ] {
+            let plan = MissionPlan { autopilot, ..rd(4) };
+            let result = flown(plan, FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
+            assert_eq!(result.figures().violations, [], "{autopilot} {:?}", texts(&result));
+            assert_eq!(result.simulation.truth().mode, mode, "{autopilot} {:?}", texts(&result));
+        }
+    }
+}
+
+#[test]
+fn an_origin_that_moves_ends_in_a_return_on_both_autopilots() {
+    for autopilot in [AutopilotKind::ArduPilot, AutopilotKind::Px4] {
+        let kind = IncidentKind::Aircraft(AircraftFault::OriginShift([-38.0, 0.0]));
+        let incidents = vec![Incident { after: Duration::from_secs(20), kind }];
+        let plan = MissionPlan { autopilot, ..rd(4) };
+        let result = flown(plan, FlightScript { incidents, ..FlightScript::plain(1.0) }, Waiter);
+        assert_eq!(result.figures().violations, [], "{autopilot} {:?}", texts(&result));
+        assert_eq!(result.simulation.truth().mode, VehicleMode::Return, "{autopilot} {:?}", texts(&result));
+        assert!(result.figures().decisions < 15, "{autopilot} {:?}", texts(&result));
+    }
 }

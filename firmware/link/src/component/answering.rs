@@ -73,6 +73,11 @@ impl Component {
         }
         match self.judge(command) {
             Err(Refusal::Unsupported(_)) if !is_exact => {}
+            // Not remembered: the operator's next command is a new one, however soon it comes.
+            Err(Refusal::Resent) => {
+                self.send_ack(command, Refusal::Resent.result());
+                self.report_refusal(command, Refusal::Resent);
+            }
             Err(refusal) => {
                 self.send_ack(command, refusal.result());
                 self.answers.remember(now, *command, refusal.result());
@@ -97,6 +102,9 @@ impl Component {
         if needs_authority(command) && !self.operators.allow(command.sender) {
             count(&mut self.stats.not_allowed);
             return Err(Refusal::NotAllowed);
+        }
+        if self.answers.is_stale_engage(command) {
+            return Err(Refusal::Resent);
         }
         let effect = judge(command, &self.owner, self.block)?;
         if effect == Effect::Send(Requested::ComponentMetadata) && self.metadata.is_none() {

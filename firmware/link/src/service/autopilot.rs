@@ -277,8 +277,7 @@ impl Autopilot {
         if self.connected
             && let (Some(address), Some(firmware)) = (self.address, self.firmware())
         {
-            let needs_origin = self.known.origin.is_none();
-            let wants = Wants { origin: needs_origin, rc: wants_rc };
+            let wants = Wants { origin: self.known.origin.is_none(), rc: wants_rc };
             self.known.streams.poll(now, address, firmware, wants, out);
         }
     }

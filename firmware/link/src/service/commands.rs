@@ -38,6 +38,8 @@ pub(crate) enum Refusal {
     NotReady,
     /// Nothing is flown.
     NotFlying,
+    /// The repetition of a request to engage that has already been run, long after it.
+    Resent,
     /// The link cannot serve the vehicle safely.
     Blocked(EngageBlock),
     /// No such command, or no such message to send.
@@ -48,7 +50,7 @@ impl Refusal {
     pub const fn result(self) -> CommandResult {
         match self {
             Refusal::NotAllowed | Refusal::Value | Refusal::NotFlying => CommandResult::Denied,
-            Refusal::NotReady | Refusal::Blocked(_) => CommandResult::TemporarilyRejected,
+            Refusal::NotReady | Refusal::Resent | Refusal::Blocked(_) => CommandResult::TemporarilyRejected,
             Refusal::Unsupported(result) => result,
         }
     }
@@ -61,6 +63,7 @@ impl fmt::Display for Refusal {
             Refusal::Value => f.write_str("bad value"),
             Refusal::NotReady => f.write_str("not ready"),
             Refusal::NotFlying => f.write_str("not flying"),
+            Refusal::Resent => f.write_str("old request, send a new one"),
             Refusal::Blocked(block) => write!(f, "{block}"),
             Refusal::Unsupported(_) => f.write_str("unsupported"),
         }
@@ -159,6 +162,8 @@ struct Answered {
 #[derive(Debug, Default)]
 pub(crate) struct Answers {
     recent: Deque<Answered, 8>,
+    /// Whether a request to engage was run since the last other choice of `MAV_CMD_USER_2`.
+    engage_run: bool,
 }
 
 impl Answers {
@@ -182,8 +187,19 @@ impl Answers {
         (newest.command.repeats(command) && (says_so || looks_so)).then_some(newest.result)
     }
 
+    /// Whether `command` repeats a request to engage that has been run, and is no recent resend. Meanwhile the human
+    /// pilot may have taken over and selected GUIDED again for another purpose, so it does not engage.
+    pub fn is_stale_engage(&self, command: &Command) -> bool {
+        self.engage_run && command.confirmation > 0 && enable_of(command) == Some(Enable::Engage)
+    }
+
     /// Remembers an answer.
     pub fn remember(&mut self, now: Instant, command: Command, result: CommandResult) {
+        if let Some(enable) = enable_of(&command)
+            && result == CommandResult::Accepted
+        {
+            self.engage_run = enable == Enable::Engage;
+        }
         if self.recent.is_full() {
             let _ = self.recent.pop_front();
         }
@@ -193,7 +209,11 @@ impl Answers {
 
 /// Off and return take the aircraft out of our hands or home, and act however often they arrive.
 fn is_always_run(command: &Command) -> bool {
+    is(command, MavCmd::MAV_CMD_USER_3) || enable_of(command) == Some(Enable::Off)
+}
+
+/// What a `MAV_CMD_USER_2` chooses.
+fn enable_of(command: &Command) -> Option<Enable> {
     let [first, ..] = command.params;
-    is(command, MavCmd::MAV_CMD_USER_3)
-        || (is(command, MavCmd::MAV_CMD_USER_2) && Enable::from_value(first) == Some(Enable::Off))
+    if is(command, MavCmd::MAV_CMD_USER_2) { Enable::from_value(first) } else { None }
 }

@@ -18,6 +18,8 @@ pub(crate) struct Steering {
     foreign: Option<Ned>,
     reported: bool,
     ended: bool,
+    /// The origin of the local frame that the targets are in.
+    origin: Option<GeoPoint>,
 }
 
 impl Steering {
@@ -35,7 +37,7 @@ impl Steering {
     /// A target of ours leaves.
     pub fn sent(&mut self, now: Instant, target: PositionTarget) {
         if self.ended {
-            *self = Steering::default();
+            *self = Steering { origin: self.origin, ..Steering::default() };
         }
         self.since.get_or_insert(now);
         match self.sent.back().copied() {
@@ -57,6 +59,7 @@ impl Steering {
     /// The autopilot reports the target that it follows. `origin` ties a global target to the local frame.
     pub fn follows(&mut self, now: Instant, reported: &FollowedTarget, origin: Option<GeoPoint>) {
         self.reported = true;
+        self.move_origin(origin);
         let Some(since) = self.since else { return };
         let Some(target) = reported.local(origin) else { return };
         let is_known = self.sent.iter().any(|(_, ours)| is_on(ours, &target))
@@ -65,6 +68,18 @@ impl Steering {
             self.foreign = Some(target);
         }
         self.followed = Some(target);
+    }
+
+    /// When the estimator's origin moves, the same target has other coordinates. That is no take-over.
+    fn move_origin(&mut self, origin: Option<GeoPoint>) {
+        let Some(origin) = origin else { return };
+        let Some(before) = self.origin.replace(origin).filter(|before| *before != origin) else { return };
+        let (north, east) = before.offset_to(&origin);
+        let targets = self.sent.iter_mut().map(|(_, target)| &mut target.position);
+        for target in targets.chain(&mut self.followed).chain(&mut self.foreign) {
+            target.north_m -= north.0;
+            target.east_m -= east.0;
+        }
     }
 
     /// The target of someone else, if the autopilot followed one since we began to steer. Stays until we begin again.
@@ -170,6 +185,19 @@ mod tests {
         let beside = FollowedTarget::Local(Ned { east_m: 4.0, ..at(30.0) });
         steering.follows(Instant::from_millis(12_000), &beside, None);
         assert!(steering.foreign().is_some());
+    }
+
+    #[test]
+    fn an_origin_that_moves_is_no_take_over() {
+        let origin = GeoPoint { lat_deg_e7: -353_632_621, lon_deg_e7: 1_491_652_374 };
+        let moved = origin.offset_by(Metres(40.0), Metres(0.0));
+        let mut steering = Steering::default();
+        steering.sent(Instant::ZERO, ours(20.0));
+        steering.follows(Instant::from_millis(2_000), &report(20.0), Some(origin));
+        steering.follows(Instant::from_millis(2_100), &report(-20.0), Some(moved));
+        assert_eq!(steering.foreign(), None);
+        steering.follows(Instant::from_millis(2_200), &report(20.0), Some(moved));
+        assert!(steering.foreign().is_some(), "40 m north of ours");
     }
 
     #[test]

@@ -70,7 +70,7 @@ struct Progress {
 /// What is wanted beyond the streams that are always needed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wants {
-    /// The estimator's origin.
+    /// The estimator's origin is unknown.
     pub origin: bool,
     /// RC channels: one is mapped to a parameter.
     pub rc: bool,
@@ -86,6 +86,9 @@ pub(crate) struct Streams {
 }
 
 impl Streams {
+    /// A known origin is requested again: it can move in flight, PX4 does not send it unasked, and a message of ArduPilot
+    /// may be lost.
+    const ORIGIN_PERIOD: Duration = Duration::from_secs(2);
     /// Time to wait for the answer to a request.
     const ANSWER: Duration = Duration::from_secs(1);
     /// After an accepted request: time until the message must have arrived.
@@ -121,10 +124,10 @@ impl Streams {
         wants: Wants,
         out: &mut Outgoing,
     ) {
-        if wants.origin && now >= self.origin_ask_at {
+        if now >= self.origin_ask_at {
             let id = dialect::GPS_GLOBAL_ORIGIN_DATA::ID as f32;
             send(target, MavCmd::MAV_CMD_REQUEST_MESSAGE, [id, 0.0, 0.0], out);
-            self.origin_ask_at = now + Streams::ACCEPTED;
+            self.origin_ask_at = now + if wants.origin { Streams::ACCEPTED } else { Streams::ORIGIN_PERIOD };
         }
         if self.asking.is_some_and(|(_, since)| now.since(since) < Streams::ANSWER) {
             return;

@@ -1,7 +1,7 @@
 //! Requests that move the aircraft, and requests of the operator that may not be lost or repeated.
 
 use crate::autopilot::{commands, heartbeat};
-use crate::conversation::{OWN, command, param_set};
+use crate::conversation::{OWN, acks, command, param_set};
 use crate::station::{Bench, STATION, VEHICLE};
 use gleaner_link::*;
 use gleaner_units::Ned;
@@ -110,6 +110,24 @@ fn off_engage_off_with_a_lost_first_transmission_is_off() {
         bench.hear_packet(STATION, &command(OWN, 31012, 0.0, 1));
         assert_eq!(bench.events(), [Event::Operator(OperatorRequest::ReturnNow)]);
     }
+}
+
+#[test]
+fn an_old_request_to_engage_that_is_resent_is_refused() {
+    let mut bench = Bench::connected();
+    let mode = |value, confirmation| command(OWN, 31011, value, confirmation);
+    bench.hear_packet(STATION, &mode(1.0, 0));
+    bench.hear_packet(STATION, &command(OWN, 31010, 0.5, 0));
+    bench.run(60_000);
+    assert_eq!(enables(&mut bench), [Enable::Engage]);
+    bench.hear_packet(VEHICLE, &heartbeat(GUIDED, true, 4));
+    acks(&mut bench);
+    for confirmation in [1, 2] {
+        bench.hear_packet(STATION, &mode(1.0, confirmation));
+        assert_eq!((acks(&mut bench), enables(&mut bench)), (vec![(31011, 1)], vec![]));
+    }
+    bench.hear_packet(STATION, &mode(1.0, 0));
+    assert_eq!(enables(&mut bench), [Enable::Engage], "a new request, however soon");
 }
 
 #[test]

@@ -80,8 +80,11 @@ impl Watch {
 
 /// Whether the origin is another than at engage.
 pub(crate) fn origin_moved(plan: &Plan, origin: Option<GeoPoint>) -> bool {
-    origin.is_some_and(|origin| {
-        let (north, east) = plan.origin.offset_to(&origin);
-        libm::hypotf(north.0, east.0) > ORIGIN_M
-    })
+    origin.is_some_and(|origin| origin_offset_m(plan, &origin) > ORIGIN_M)
+}
+
+/// Distance of an origin from that at engage, m.
+pub(crate) fn origin_offset_m(plan: &Plan, origin: &GeoPoint) -> f32 {
+    let (north, east) = plan.origin.offset_to(origin);
+    libm::hypotf(north.0, east.0)
 }

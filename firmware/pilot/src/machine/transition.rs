@@ -96,7 +96,7 @@ impl Machine {
 
     fn give_up(&mut self, now: Instant, fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) {
         let Phase::Flying(flight) = &self.phase else { return };
-        let hand_back = HandBack::new(now, flight.left(inputs.vehicle.position));
+        let hand_back = HandBack::new(now, flight.left(inputs.vehicle));
         self.enter(Phase::Fault(fault, hand_back), out);
     }
 

@@ -10,9 +10,9 @@ use crate::flight::leg::{Leg, Progress, Purpose};
 use crate::flight::plan::Plan;
 use crate::flight::speed::Speed;
 use crate::flight::stream::Stream;
-use crate::flight::watch::{Finding, Watch, origin_moved};
+use crate::flight::watch::{Finding, Watch, origin_moved, origin_offset_m};
 use crate::scene::Scene;
-use crate::{Fault, Outputs, ReturnReason, State, TakeOver};
+use crate::{Fault, Outputs, ReturnReason, State, TakeOver, Vehicle};
 use gleaner_link::{Autopilot, Firmware, PositionTarget, Severity};
 use gleaner_units::{Action, Cell, Decimal, Duration, Instant, Metres, Ned};
 
@@ -88,10 +88,12 @@ impl Flight {
     }
 
     /// Where the aircraft is left when this flight fails.
-    pub(crate) fn left(&self, position: Option<Ned>) -> Left {
-        let position = position.filter(Ned::is_finite).unwrap_or(self.course.leg.target);
+    pub(crate) fn left(&self, vehicle: &Vehicle) -> Left {
+        let position = vehicle.position.filter(Ned::is_finite).unwrap_or(self.course.leg.target);
         let (at, coasting_m) = self.course.stopping(position);
-        let within_m = 1.5 * self.plan.frame.grid().cell().0 + coasting_m;
+        // After a move of the origin the last position and the next one may be in different frames.
+        let frames_m = vehicle.origin.map_or(0.0, |origin| origin_offset_m(&self.plan, &origin));
+        let within_m = 1.5 * self.plan.frame.grid().cell().0 + coasting_m + frames_m;
         Left { at, within_m, unheard: false }
     }
 
@@ -187,14 +189,15 @@ impl Flight {
         if scene.late {
             return Err(Outcome::Fault(Fault::Late));
         }
+        // A moved origin also changes the coordinates of our own targets.
+        if origin_moved(&self.plan, vehicle.origin) {
+            return Err(Outcome::Fault(Fault::OriginMoved));
+        }
         if scene.inputs.foreign_target {
             return Err(Outcome::Passive(TakeOver::Target));
         }
         if vehicle.failsafe && vehicle.firmware == Some(Firmware::Px4) {
             return Err(Outcome::Fault(Fault::Failsafe));
-        }
-        if origin_moved(&self.plan, vehicle.origin) {
-            return Err(Outcome::Fault(Fault::OriginMoved));
         }
         let position = vehicle.position.filter(Ned::is_finite);
         let position = position.filter(|_| now.since(self.ready_at) <= UNREADY);

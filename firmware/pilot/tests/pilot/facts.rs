@@ -18,6 +18,22 @@ fn an_origin_that_moves_is_a_fault() {
 }
 
 #[test]
+fn after_an_origin_shift_the_return_is_requested() {
+    let mut rig = Rig::engaged();
+    rig.run(2.0);
+    rig.obeys = false;
+    rig.vehicle.origin = Some(CORNER.offset_by(Metres(-40.0), Metres(50.0)));
+    // The autopilot's target has other coordinates too.
+    rig.foreign_target = true;
+    rig.step();
+    assert_eq!(rig.machine.fault(), Some(Fault::OriginMoved));
+    rig.foreign_target = false;
+    rig.vehicle.position.as_mut().unwrap().north_m -= 60.0;
+    rig.run(2.0);
+    assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 1, "the aircraft was not moved by another");
+}
+
+#[test]
 fn an_altitude_that_is_lost_for_three_seconds_is_a_fault() {
     let mut rig = Rig::engaged();
     rig.run(2.0);

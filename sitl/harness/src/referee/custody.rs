@@ -180,12 +180,20 @@ impl Custody {
         }
     }
 
-    /// Ground truth, once a step.
+    /// Ground truth, once a step. Another station whose target has been in force for [`FOREIGN_TARGET_S`] has the
+    /// aircraft.
     pub fn watch(&mut self, now: Instant, truth: &Truth) {
         let foreign = truth.mode == VehicleMode::Guided && truth.target_by == Some(Commander::Operator);
         if self.holder == Holder::Pilot && foreign {
             self.foreign_since.get_or_insert(now);
         }
+        if self.holder == Holder::Pilot && foreign && self.is_foreign(now) {
+            self.holder = Holder::Other;
+        }
+    }
+
+    fn is_foreign(&self, now: Instant) -> bool {
+        self.foreign_since.is_some_and(|since| now - since > self.scaled(FOREIGN_TARGET_S))
     }
 
     /// A frame left the pilot. The rule that it breaks, if any.
@@ -217,9 +225,8 @@ impl Custody {
     }
 
     fn target_sent(&self, now: Instant) -> Option<Rule> {
-        let foreign = self.foreign_since.is_some_and(|since| now - since > self.scaled(FOREIGN_TARGET_S));
         match self.holder {
-            Holder::Pilot if foreign => Some(Rule::OverwroteTarget),
+            Holder::Pilot | Holder::Other if self.is_foreign(now) => Some(Rule::OverwroteTarget),
             Holder::Pilot => None,
             // PX4 accepts OFFBOARD only with a stream; during a failsafe the stream itself would bring it back.
             Holder::Asked(_) if self.kind == AutopilotKind::Px4 => {

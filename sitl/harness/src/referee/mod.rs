@@ -144,9 +144,11 @@ impl Referee {
         self.disturbed_until = self.disturbed_until.max(until);
     }
 
-    /// From now on a flown unit takes this many units from the pack.
-    pub fn price_changes(&mut self, factor: f32) {
+    /// From now on a flown unit takes this many units from the pack. At a higher price the charge may no longer cover
+    /// the way home; the pilot is not judged by that.
+    pub fn price_changes(&mut self, factor: f32, truth: &Truth) {
         self.true_price = self.true_price.max(factor);
+        self.could_return &= self.covers_return(truth);
     }
 
     /// The pack lost charge that no decision pays for.

@@ -226,11 +226,28 @@ fn the_envelope_agrees_with_hand_counts() {
 }
 
 #[test]
+fn another_stations_target_takes_the_aircraft_after_5_s() {
+    let mut stand = Stand::engaged(AutopilotKind::ArduPilot);
+    let truth = Truth { target_by: Some(Commander::Operator), ..over(&stand, Cell::new(10, 6), 0.0) };
+    for second in 11..=15 {
+        stand.referee.watch(at(second * 1_000), &truth);
+        assert!(!stand.referee.is_revoked(), "{second} s");
+    }
+    stand.target(at(15_900));
+    assert_eq!(stand.rules(), []);
+    stand.referee.watch(at(16_100), &truth);
+    assert!(stand.referee.is_revoked());
+    stand.target(at(16_200));
+    assert_eq!(stand.rules(), [Rule::OverwroteTarget]);
+}
+
+#[test]
 fn an_empty_pack_counts_only_if_the_way_home_was_covered() {
-    for (battery, broken) in [(100.0, true), (20.0, false)] {
+    for (battery, price, broken) in [(100.0, 1.0, true), (20.0, 1.0, false), (100.0, 2.5, false)] {
         let mut stand = Stand::engaged(AutopilotKind::ArduPilot);
         let truth = Truth { battery: BatteryUnits(battery), ..over(&stand, Cell::new(10, 6), 0.0) };
         stand.referee.could_return = stand.referee.covers_return(&truth);
+        stand.referee.price_changes(price, &truth);
         stand.referee.flying = true;
         stand.referee.watch(at(20_000), &Truth { battery: BatteryUnits(0.0), ..truth });
         assert_eq!(stand.rules().contains(&Rule::PackEmpty), broken);

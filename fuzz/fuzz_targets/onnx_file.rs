@@ -1,0 +1,7 @@
+//! See ../bodies/onnx_file.rs.
+#![no_main]
+
+#[path = "../bodies/onnx_file.rs"]
+mod body;
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| body::run(data));
