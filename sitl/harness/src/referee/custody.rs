@@ -64,6 +64,8 @@ pub(super) struct Custody {
 const EVIDENCE_AGE_S: f32 = 1.5;
 /// A request to engage expires after 60 s; the rest is for the climb of the test's own timing.
 const REQUEST_AGE_S: f32 = 75.0;
+/// A target that is in force for so long was reported to the pilot at least twice (5 Hz).
+const REPORTED_S: f32 = 0.5;
 /// Targets of another station must be noticed after so long.
 const FOREIGN_TARGET_S: f32 = 5.0;
 
@@ -186,6 +188,9 @@ impl Custody {
         let foreign = truth.mode == VehicleMode::Guided && truth.target_by == Some(Commander::Operator);
         if self.holder == Holder::Pilot && foreign {
             self.foreign_since.get_or_insert(now);
+        } else if self.foreign_since.is_some_and(|since| now - since < self.scaled(REPORTED_S)) {
+            // Replaced before the autopilot reported it: the pilot cannot know.
+            self.foreign_since = None;
         }
         if self.holder == Holder::Pilot && foreign && self.is_foreign(now) {
             self.holder = Holder::Other;
