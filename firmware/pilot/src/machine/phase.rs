@@ -8,6 +8,7 @@ use crate::{Fault, State, TakeOver};
 
 /// The phases behind [`State`].
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a flight is large, and there is no heap to put it on")]
 pub(super) enum Phase {
     Boot,
     Idle,
