@@ -148,7 +148,7 @@ fn every_stream_is_requested_until_it_arrives() {
         (1, 500_000),
         (242, 1_000_000),
         (33, 500_000),
-        (85, 200_000),
+        (85, 83_333),
     ] {
         assert!(streams.contains(&(id as f32, interval_us as f32)), "message {id} not in {streams:?}");
     }
