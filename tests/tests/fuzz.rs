@@ -98,7 +98,7 @@ fn file(path: &str) -> Vec<u8> {
     std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The missions and cities of the harness's tests.
+/// The missions and cities of the field inputs.
 fn field_files(name: &str) -> Vec<Vec<u8>> {
     [
         "03-excel-semicolon",
@@ -108,7 +108,7 @@ fn field_files(name: &str) -> Vec<Vec<u8>> {
         "07-trailing-commas",
         "08-nodata",
     ]
-    .map(|case| file(&format!("sitl/harness/tests/data/{case}/{name}")))
+    .map(|case| file(&format!("tests/field/{case}/{name}")))
     .to_vec()
 }
 
