@@ -98,18 +98,9 @@ fn file(path: &str) -> Vec<u8> {
     std::fs::read(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The missions and cities of the field inputs.
-fn field_files(name: &str) -> Vec<Vec<u8>> {
-    [
-        "03-excel-semicolon",
-        "04-empty-cells",
-        "05-lidar-decimals",
-        "06-bom-csv",
-        "07-trailing-commas",
-        "08-nodata",
-    ]
-    .map(|case| file(&format!("tests/field/{case}/{name}")))
-    .to_vec()
+/// The same file of several field inputs.
+fn field_files<const N: usize>(cases: [&str; N], name: &str) -> Vec<Vec<u8>> {
+    cases.map(|case| file(&format!("tests/field/{case}/{name}"))).to_vec()
 }
 
 /// A mission for the city of 4 x 3 cells that the target offers.
@@ -143,7 +134,10 @@ fn onnx_files() {
 
 #[test]
 fn mission_files() {
-    let mut valid = field_files("mission.toml");
+    let mut valid = field_files(
+        ["01-geojson-osm", "09-toml-bom", "10-toml-crlf", "11-toml-utf16", "14-roofs"],
+        "mission.toml",
+    );
     valid.push(gleaner_pilot::mission_file::write(&small_mission(), "city.csv").into_bytes());
     (0..INPUTS).for_each(|seed| mission_file::run(&damaged(seed, &valid)));
 }
@@ -156,7 +150,16 @@ fn mission_images() {
 
 #[test]
 fn city_files() {
-    let valid = field_files("city.csv");
+    let cases = [
+        "03-excel-semicolon",
+        "04-empty-cells",
+        "05-lidar-decimals",
+        "06-bom-csv",
+        "07-trailing-commas",
+        "08-nodata",
+        "10-toml-crlf",
+    ];
+    let valid = field_files(cases, "city.csv");
     (0..INPUTS).for_each(|seed| city_file::run(&damaged(seed, &valid)));
 }
 
