@@ -71,8 +71,9 @@ fn verbose_prints_one_line_for_each_decision() {
     FakeAutopilot::find(&mut running).await_decision();
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");
-    let decisions =
-        rest.lines().filter(|line| line.contains(": hover at (1, 0), w 0.25, battery 20, spare "));
+    let decisions = rest
+        .lines()
+        .filter(|line| line.contains("decision ") && line.contains(" at (1, 0), w 0.25, battery 20, spare "));
     let logged = std::fs::read_to_string(fixture.path("log/decisions.jsonl")).unwrap();
     assert_eq!(decisions.count(), logged.lines().count(), "{rest}");
 }
