@@ -1,13 +1,42 @@
 //! Telemetry that both autopilots lay out alike.
 
+use super::LinkId;
 use super::airframe::Airframe;
+use super::guidance::Guidance;
+use super::ports::Ports;
 use gleaner_units::{GeoPoint, Instant, Metres, Ned};
+use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 
 /// Height of the estimator's origin above sea level, mm: ArduPilot's simulated field.
 pub(super) const ORIGIN_AMSL_MM: i32 = 584_000;
 
 impl Airframe {
+    /// Sends one message about position, origin, home or target; whether there is one. Without a home there is no
+    /// position, and a target only in GUIDED or OFFBOARD with one.
+    pub fn send_position(
+        &self,
+        ports: &mut Ports,
+        link: LinkId,
+        now: Instant,
+        guidance: Guidance,
+        message_id: u32,
+    ) -> bool {
+        let Some(home) = self.home else { return false };
+        match message_id {
+            LOCAL_POSITION_NED_DATA::ID => ports.send(link, &self.local_position_message(now)),
+            GLOBAL_POSITION_INT_DATA::ID => ports.send(link, &self.global_position_message(now, home)),
+            GPS_GLOBAL_ORIGIN_DATA::ID => ports.send(link, &self.origin_message(now)),
+            HOME_POSITION_DATA::ID => ports.send(link, &self.home_message(now, home)),
+            POSITION_TARGET_LOCAL_NED_DATA::ID => {
+                let Guidance::Target(target) = guidance else { return false };
+                ports.send(link, &self.target_message(now, target.position, target.velocity));
+            }
+            _ => return false,
+        }
+        true
+    }
+
     /// A point of the local frame on the globe, and its height above sea level in mm.
     pub fn geographic(&self, position: Ned) -> (GeoPoint, i32) {
         let point = self.origin().offset_by(Metres(position.north_m), Metres(position.east_m));
@@ -20,13 +49,13 @@ impl Airframe {
         ((degrees + 360.0) % 360.0 * 100.0) as u16
     }
 
-    pub fn local_position_message(&self, now: Instant) -> LOCAL_POSITION_NED_DATA {
+    fn local_position_message(&self, now: Instant) -> LOCAL_POSITION_NED_DATA {
         let Ned { north_m: x, east_m: y, down_m: z } = self.estimated();
         let [vx, vy, vz] = self.body.velocity.map(|speed| speed as f32);
         LOCAL_POSITION_NED_DATA { time_boot_ms: now.as_boot_ms(), x, y, z, vx, vy, vz }
     }
 
-    pub fn global_position_message(&self, now: Instant, home: Ned) -> GLOBAL_POSITION_INT_DATA {
+    fn global_position_message(&self, now: Instant, home: Ned) -> GLOBAL_POSITION_INT_DATA {
         let (point, alt) = self.geographic(self.estimated());
         let [vx, vy, vz] = self.body.velocity.map(|speed| (speed * 100.0) as i16);
         GLOBAL_POSITION_INT_DATA {
@@ -64,7 +93,7 @@ impl Airframe {
         }
     }
 
-    pub fn origin_message(&self, now: Instant) -> GPS_GLOBAL_ORIGIN_DATA {
+    fn origin_message(&self, now: Instant) -> GPS_GLOBAL_ORIGIN_DATA {
         let GeoPoint { lat_deg_e7, lon_deg_e7 } = self.origin();
         GPS_GLOBAL_ORIGIN_DATA {
             latitude: lat_deg_e7,
@@ -74,7 +103,7 @@ impl Airframe {
         }
     }
 
-    pub fn home_message(&self, now: Instant, home: Ned) -> HOME_POSITION_DATA {
+    fn home_message(&self, now: Instant, home: Ned) -> HOME_POSITION_DATA {
         let (point, altitude) = self.geographic(home);
         HOME_POSITION_DATA {
             latitude: point.lat_deg_e7,
@@ -111,7 +140,7 @@ impl Airframe {
     }
 
     /// `POSITION_TARGET_LOCAL_NED` for a target of the boot frame.
-    pub fn target_message(
+    fn target_message(
         &self,
         now: Instant,
         position: [f64; 3],

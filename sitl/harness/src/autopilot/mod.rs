@@ -97,6 +97,11 @@ impl LinkId {
     pub const CREW: LinkId = LinkId(2);
     /// All ports.
     pub const ALL: [LinkId; 3] = [LinkId::COMPANION, LinkId::GROUND, LinkId::CREW];
+
+    /// What commands through this port.
+    pub(crate) fn commander(self) -> Commander {
+        if self == LinkId::COMPANION { Commander::Companion } else { Commander::Operator }
+    }
 }
 
 /// Constants of the simulated aircraft.

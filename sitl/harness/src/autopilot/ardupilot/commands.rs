@@ -27,7 +27,7 @@ impl ArduCopter {
         }
         match frame.message_id {
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => match wire::parse(frame) {
-                Some(target) => self.take_target(&target, commander(link)),
+                Some(target) => self.take_target(&target, link.commander()),
                 // An unknown frame number: it stops and holds.
                 None if self.mode == VehicleMode::Guided => self.guidance = Guidance::Halt,
                 None => {}
@@ -82,7 +82,7 @@ impl ArduCopter {
 
     fn obey(&mut self, link: LinkId, command: &Command) -> MavResult {
         let [p1, p2, _, _, _, _, p7] = command.params;
-        let by = commander(link);
+        let by = link.commander();
         let is = |known: MavCmd| known as u32 == u32::from(command.id);
         match () {
             () if is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) && p1 == 1.0 => self.arm(p2 == FORCE),
@@ -166,7 +166,7 @@ impl ArduCopter {
     fn set_mode(&mut self, link: LinkId, frame: &Frame) {
         let byte = |at: usize| frame.payload().get(at).copied().unwrap_or(0);
         let custom_mode = u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]);
-        let result = self.change_mode(commander(link), custom_mode);
+        let result = self.change_mode(link.commander(), custom_mode);
         self.ports.acknowledge(link, SET_MODE as u16, result, frame.sender);
     }
 
@@ -214,10 +214,6 @@ impl ArduCopter {
             self.ports.send(link, &data);
         }
     }
-}
-
-fn commander(link: LinkId) -> Commander {
-    if link == LinkId::COMPANION { Commander::Companion } else { Commander::Operator }
 }
 
 /// As ArduPilot spells the mode in its texts.

@@ -109,27 +109,7 @@ impl ArduCopter {
             BATTERY_STATUS_DATA::ID => self.ports.send(link, &self.battery_status()),
             EKF_STATUS_REPORT_DATA::ID => self.ports.send(link, &self.estimator()),
             EXTENDED_SYS_STATE_DATA::ID => self.ports.send(link, &self.landed()),
-            _ => return self.send_position_by_id(link, message_id),
-        }
-        true
-    }
-
-    fn send_position_by_id(&mut self, link: LinkId, message_id: u32) -> bool {
-        let (now, Some(home)) = (self.now, self.airframe.home) else { return false };
-        match message_id {
-            LOCAL_POSITION_NED_DATA::ID => self.ports.send(link, &self.airframe.local_position_message(now)),
-            GLOBAL_POSITION_INT_DATA::ID => {
-                self.ports.send(link, &self.airframe.global_position_message(now, home));
-            }
-            GPS_GLOBAL_ORIGIN_DATA::ID => self.ports.send(link, &self.airframe.origin_message(now)),
-            HOME_POSITION_DATA::ID => self.ports.send(link, &self.airframe.home_message(now, home)),
-            POSITION_TARGET_LOCAL_NED_DATA::ID => {
-                // Only with a GUIDED target.
-                let Guidance::Target(target) = self.guidance else { return false };
-                let message = self.airframe.target_message(now, target.position, target.velocity);
-                self.ports.send(link, &message);
-            }
-            _ => return false,
+            _ => return self.airframe.send_position(&mut self.ports, link, now, self.guidance, message_id),
         }
         true
     }

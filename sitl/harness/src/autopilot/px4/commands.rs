@@ -1,5 +1,6 @@
 //! Commands and requests that the autopilot receives.
 
+use super::super::battery::Level;
 use super::super::guidance::Guidance;
 use super::super::messages::ORIGIN_AMSL_MM;
 use super::super::parameters::Parameter;
@@ -25,7 +26,7 @@ impl Px4 {
         match frame.message_id {
             SET_POSITION_TARGET_LOCAL_NED_DATA::ID => {
                 if let Some(target) = wire::parse(frame) {
-                    self.take_target(&target, commander(link));
+                    self.take_target(&target, link.commander());
                 }
             }
             PARAM_SET_DATA::ID => {
@@ -76,7 +77,7 @@ impl Px4 {
 
     fn obey(&mut self, link: LinkId, command: &Command) -> MavResult {
         let [p1, p2, p3, _, _, _, p7] = command.params;
-        let by = commander(link);
+        let by = link.commander();
         let is = |known: MavCmd| known as u32 == u32::from(command.id);
         match () {
             () if is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) && p1 == 1.0 => self.arm(p2 == FORCE),
@@ -116,7 +117,7 @@ impl Px4 {
             Some("Arming denied: no offboard signal")
         } else if matches!(self.mode, VehicleMode::Return | VehicleMode::Land) {
             Some("Arming denied: switch to another mode first")
-        } else if self.airframe.battery.level > super::super::battery::Level::Low {
+        } else if self.airframe.battery.level > Level::Low {
             Some("Arming denied: low battery")
         } else {
             None
@@ -195,8 +196,4 @@ impl Px4 {
             self.ports.send(link, &data);
         }
     }
-}
-
-pub(super) fn commander(link: LinkId) -> Commander {
-    if link == LinkId::COMPANION { Commander::Companion } else { Commander::Operator }
 }

@@ -1,7 +1,6 @@
 //! Messages that the autopilot sends.
 
 use super::super::battery::Level;
-use super::super::guidance::Guidance;
 use super::super::{AutopilotKind, LinkId, VehicleMode};
 use super::Px4;
 use gleaner_units::Duration;
@@ -146,26 +145,7 @@ impl Px4 {
                 let time_boot_ms = now.as_boot_ms();
                 self.ports.send(link, &RC_CHANNELS_DATA { time_boot_ms, ..RC_CHANNELS_DATA::DEFAULT });
             }
-            _ => return self.send_position_by_id(link, message_id),
-        }
-        true
-    }
-
-    fn send_position_by_id(&mut self, link: LinkId, message_id: u32) -> bool {
-        let (now, Some(home)) = (self.now, self.airframe.home) else { return false };
-        match message_id {
-            LOCAL_POSITION_NED_DATA::ID => self.ports.send(link, &self.airframe.local_position_message(now)),
-            GLOBAL_POSITION_INT_DATA::ID => {
-                self.ports.send(link, &self.airframe.global_position_message(now, home));
-            }
-            GPS_GLOBAL_ORIGIN_DATA::ID => self.ports.send(link, &self.airframe.origin_message(now)),
-            HOME_POSITION_DATA::ID => self.ports.send(link, &self.airframe.home_message(now, home)),
-            POSITION_TARGET_LOCAL_NED_DATA::ID => {
-                let Guidance::Target(target) = self.guidance else { return false };
-                let message = self.airframe.target_message(now, target.position, target.velocity);
-                self.ports.send(link, &message);
-            }
-            _ => return false,
+            _ => return self.airframe.send_position(&mut self.ports, link, now, self.guidance, message_id),
         }
         true
     }
