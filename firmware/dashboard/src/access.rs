@@ -121,7 +121,7 @@ impl Access {
     /// The rights of a request with these headers.
     pub(crate) fn rights(&self, headers: &HeaderMap) -> Rights {
         match self {
-            // The name that the browser believes it talks to: a foreign one is a page that had its name resolved to
+            // The name under which the browser reached the server: a foreign one is a page that had its name resolved to
             // this computer (DNS rebinding).
             Access::Loopback => {
                 let local = text(headers, header::HOST).is_some_and(is_loopback_name);

@@ -197,14 +197,14 @@ pub struct WhatIfOption {
     pub energy: f32,
 }
 
-/// A change that viewers are told.
+/// A change that is sent to viewers.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
     /// The aircraft moved on; at most five a second.
     Live(Live),
     /// A decision was made.
     Decision(Decision),
-    /// The operator was told something.
+    /// A text was sent to the operator.
     Text(Text),
     /// New predictions.
     WhatIf(WhatIf),
@@ -289,7 +289,7 @@ impl Flight {
     }
 }
 
-/// Forgets the older half when the list is full.
+/// Drops the older half when the list is full.
 fn push_bounded<T>(list: &mut Vec<T>, entry: T) {
     if list.len() >= ENTRIES_MAX {
         list.drain(..ENTRIES_MAX / 2);

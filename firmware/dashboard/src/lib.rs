@@ -13,7 +13,7 @@
 //! an event that finds the channel full is dropped and counted.
 //!
 //! # Access
-//! On a loopback address everybody on this computer may look and command. On any other address the server refuses to
+//! On a loopback address every program of this computer may read and command. On any other address the server refuses to
 //! start without tokens: one to look, one to command ([`Access`]). A token travels in the `Authorization` header, never
 //! in a cookie, so no other site can use it. Requests whose `Host` or `Origin` does not belong to the page are refused,
 //! bodies are at most 1 KiB, connections and viewers are counted and bounded, commands are limited in rate.

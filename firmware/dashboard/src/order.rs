@@ -32,7 +32,7 @@ pub enum Request {
 /// A command that waits for its answer.
 #[derive(Debug)]
 pub struct Order {
-    /// What is asked for.
+    /// The request.
     pub command: Command,
     answer: oneshot::Sender<String>,
 }

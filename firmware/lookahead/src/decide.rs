@@ -17,7 +17,7 @@ pub const W_DATA_MAX: f32 = 0.98;
 /// Temperatures of a search from scratch, and of a search from the kept plan; percent of the data.
 const FRESH: [f32; 2] = [1.0, 0.1];
 const ONWARD: [f32; 2] = [0.5, 0.05];
-/// Share of the budget that goes into a search from scratch while there is a kept plan: one in so many tours.
+/// While there is a kept plan, one tour in this many is searched from scratch.
 const FRESH_SHARE: u32 = 4;
 /// Utilities that differ by less are equal.
 const TIE: f32 = 1e-4;
@@ -138,7 +138,7 @@ impl<const D: usize> LookAhead<D> {
         }
     }
 
-    /// Begins a mission: decides line of sight for all devices, and forgets plan and channel fit. Without a map, or with
+    /// Begins a mission: decides line of sight for all devices, and discards plan and channel fit. Without a map, or with
     /// more than `D` devices, the network decides alone. `seed` fixes the random draws of the search.
     ///
     /// # Cost

@@ -39,7 +39,7 @@ impl Rates {
         Rates { units: [[0; RINGS]; 2], shift: 0, built_for: None }
     }
 
-    /// Forgets the channel, so that the next [`Rates::update`] rebuilds the table.
+    /// Discards the channel, so that the next [`Rates::update`] rebuilds the table.
     pub const fn clear(&mut self) {
         self.built_for = None;
     }

@@ -37,7 +37,7 @@ const fn is_none(count: &u32) -> bool {
 }
 
 impl OracleSetting {
-    /// The same of the first `count` realizations; `None` if there are not so many.
+    /// The same of the first `count` realizations; `None` if there are fewer.
     #[must_use]
     pub fn first(&self, count: u64) -> Option<OracleSetting> {
         let len = usize::try_from(count).ok()?;

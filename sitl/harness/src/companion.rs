@@ -2,15 +2,10 @@
 
 use crate::script::ComputerFault;
 use crate::simulation::Simulation;
-use gleaner_pilot::{
-    ChannelEstimate, Deliberator, LookAheadRecord, Mission, Onboard, OnboardError, ParameterId, Parameters,
-    Place, Settings, State,
-};
-use gleaner_policy::{DeviceState, Inference, SelfTestError, Tokens};
+use gleaner_pilot::{Deliberator, Mission, Onboard, OnboardError, ParameterId, Parameters, Settings, State};
+use gleaner_policy::SelfTestError;
 use gleaner_radio::encode;
-use gleaner_units::{Action, ActionMask, Instant, Sight};
-use std::cell::RefCell;
-use std::rc::Rc;
+use gleaner_units::Instant;
 
 /// A companion computer in the simulation.
 pub trait Companion {
@@ -47,36 +42,6 @@ fn turn<P: Deliberator>(onboard: &mut Onboard<P>, simulation: &mut Simulation, n
     }
 }
 
-/// A policy that outlives the pilots that use it.
-struct Shared<P>(Rc<RefCell<P>>);
-
-impl<P: Deliberator> Deliberator for Shared<P> {
-    const LOOKS_AHEAD: bool = P::LOOKS_AHEAD;
-
-    fn infer(&mut self, tokens: &Tokens) -> Option<Inference> {
-        self.0.borrow_mut().infer(tokens)
-    }
-
-    fn begin(&mut self, sight: Option<&dyn Sight>, devices: impl Iterator<Item = DeviceState>, seed: u32) {
-        self.0.borrow_mut().begin(sight, devices, seed);
-    }
-
-    fn propose(
-        &mut self,
-        place: &Place<'_>,
-        devices: impl Iterator<Item = DeviceState>,
-        logits: &[f32; Action::COUNT],
-        mask: ActionMask,
-        is_on: bool,
-    ) -> Option<(Action, LookAheadRecord)> {
-        self.0.borrow_mut().propose(place, devices, logits, mask, is_on)
-    }
-
-    fn channel(&self) -> Option<ChannelEstimate> {
-        self.0.borrow().channel()
-    }
-}
-
 /// The parameters of a fresh installation on a computer with an operating system.
 pub(crate) fn parameters(looks_ahead: bool) -> Parameters {
     let mut parameters = Parameters::default();
@@ -92,10 +57,11 @@ const SOCKET_BYTES: usize = 212_992;
 pub struct Computer<P> {
     mission: Mission,
     settings: Settings,
-    policy: Rc<RefCell<P>>,
     self_test: Result<(), SelfTestError>,
     /// `None` while the program is not running.
-    onboard: Option<Onboard<Shared<P>>>,
+    onboard: Option<Onboard<P>>,
+    /// The policy while the program is not running.
+    policy: Option<P>,
     parameters: Parameters,
     stalled_until: Instant,
     starts_at: Instant,
@@ -118,9 +84,9 @@ impl<P: Deliberator> Computer<P> {
         let mut computer = Computer {
             mission,
             settings,
-            policy: Rc::new(RefCell::new(policy)),
             self_test,
             onboard: None,
+            policy: Some(policy),
             parameters: parameters(P::LOOKS_AHEAD),
             stalled_until: Instant::ZERO,
             starts_at: Instant::ZERO,
@@ -132,7 +98,7 @@ impl<P: Deliberator> Computer<P> {
     }
 
     fn start(&mut self) -> Result<(), OnboardError> {
-        let policy = Shared(Rc::clone(&self.policy));
+        let Some(policy) = self.policy.take() else { return Ok(()) };
         let (mission, parameters) = (self.mission.clone(), self.parameters.clone());
         self.onboard = Some(Onboard::new(mission, parameters, self.settings, policy, self.self_test)?);
         Ok(())
@@ -196,6 +162,7 @@ impl<P: Deliberator> Companion for Computer<P> {
             ComputerFault::Restart(after) => {
                 if let Some(onboard) = self.onboard.take() {
                     self.parameters = onboard.parameters().clone();
+                    self.policy = Some(onboard.into_policy());
                 }
                 self.waiting.clear();
                 self.waiting_bytes = 0;

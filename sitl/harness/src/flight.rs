@@ -29,7 +29,7 @@ pub enum FlightError {
 pub enum Ending {
     /// Disarmed on the ground.
     OnTheGround,
-    /// Somebody else flies the aircraft, and the pilot leaves it to them.
+    /// A human pilot or another program flies the aircraft, and the pilot stays passive.
     TakenOver,
     /// The pilot was never engaged.
     NeverEngaged,

@@ -56,7 +56,7 @@ pub(crate) enum Entry {
     Ground,
 }
 
-/// One intrusion that goes on.
+/// An intrusion in progress.
 #[derive(Debug)]
 pub(crate) struct Intruder {
     intrusion: Intrusion,

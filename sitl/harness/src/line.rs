@@ -14,18 +14,18 @@ pub enum Lane {
     Down,
 }
 
-/// A fault of the line. Random ones name their probability as one in so many.
+/// A fault of the line. The number of a random fault is N of its probability 1/N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LineFault {
     /// Nothing passes; `None` is both directions.
     Cut(Option<Lane>),
-    /// One byte in so many is replaced by another.
+    /// One byte in N is replaced by a random byte.
     Noise(u32),
     /// Every frame is late by this much.
     Delay(Duration),
-    /// One frame in so many arrives twice.
+    /// One frame in N arrives twice.
     Duplication(u32),
-    /// One frame in so many arrives 60 ms late, behind its successors.
+    /// One frame in N arrives 60 ms late, after its successors.
     Reordering(u32),
     /// `COMMAND_ACK` frames of the autopilot are lost.
     AcksLost,

@@ -74,7 +74,7 @@ impl Modem {
         serving
     }
 
-    /// Somebody else flies the aircraft over `cell`.
+    /// The aircraft is over `cell`, outside a slot of the pilot.
     pub fn carry_to(&mut self, cell: Cell) {
         if self.cell != cell {
             self.cell = cell;

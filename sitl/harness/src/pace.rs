@@ -3,8 +3,8 @@
 use crate::flight::STEP;
 use std::time::{Duration, Instant};
 
-/// After so many steps at once the machine was asleep or is too slow; the simulation then loses time instead of
-/// catching up.
+/// With more steps than this due at once, the machine was asleep or is too slow. The simulation then loses time
+/// instead of catching up.
 const STEPS_AT_ONCE: u32 = 50;
 
 /// Says when the next [`STEP`] is due.

@@ -11,7 +11,7 @@ pub enum RadioFault {
     Silent,
     /// Reports are this many seconds old.
     Stale(u32),
-    /// Every report arrives so many times.
+    /// Every report arrives this many times.
     Repeated(u8),
     /// Reports claim that the devices are empty.
     LyingEmpty,
@@ -19,7 +19,7 @@ pub enum RadioFault {
     LyingFull,
     /// Reports claim a strong signal from every device.
     LyingStrong,
-    /// So many reports of devices that are not in the mission come with every round.
+    /// Every round contains this many reports of devices that are not in the mission.
     Unknown(u8),
 }
 

@@ -39,9 +39,9 @@ pub struct Incident {
 /// A fault of the companion computer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ComputerFault {
-    /// The program does not run for so long, as after SIGSTOP; what arrives meanwhile waits in the socket.
+    /// The program does not run for this time, as after SIGSTOP. What arrives meanwhile waits in the socket.
     Stall(Duration),
-    /// The program ends and is started again after so long.
+    /// The program ends and is started again after this time.
     Restart(Duration),
 }
 
@@ -50,13 +50,13 @@ pub enum ComputerFault {
 pub enum IncidentKind {
     /// A fault of the aircraft or its autopilot, or an action of the human pilot.
     Aircraft(AircraftFault),
-    /// The line between companion and autopilot fails for so long.
+    /// The line between companion and autopilot fails for this time.
     Line(LineFault, Duration),
-    /// The radio fails for so long.
+    /// The radio fails for this time.
     Radio(RadioFault, Duration),
     /// The companion computer fails.
     Computer(ComputerFault),
-    /// Another participant joins the network for so long.
+    /// Another participant joins the network for this time.
     Intrusion(Intrusion, Duration),
 }
 

@@ -75,7 +75,7 @@ impl Simulation {
         let truth = self.autopilot.truth();
         self.referee.watch(now, &truth);
         self.journal.track_point(now, &truth);
-        // When somebody else flies, the devices are heard from wherever the aircraft is.
+        // Outside the pilot's slots, the devices are heard from the cell below the aircraft.
         self.deciding &= matches!(truth.mode, VehicleMode::Guided | VehicleMode::Land);
         if !self.deciding
             && !truth.on_ground
@@ -237,7 +237,7 @@ impl Simulation {
         }
     }
 
-    /// Tells the referee which of its figures a fault changes.
+    /// Passes to the referee what a fault changes in its figures.
     fn prepare_referee(&mut self, fault: AircraftFault) {
         match fault {
             AircraftFault::PositionJump(_, lasts) => {

@@ -40,7 +40,7 @@ impl Trial {
     /// The trial with this number: RD or RB, 1 to 12 devices (30 in one of sixteen), 60 to 120 battery units, up to
     /// three switches of the preference, and one or two fault classes, or none in one of eight. `calm` draws none.
     ///
-    /// The reserve covers the energy that the incidents take: without energy no pilot brings the aircraft home.
+    /// The reserve covers the energy that the incidents take.
     #[must_use]
     pub fn draw(number: u64, autopilot: AutopilotKind, calm: bool) -> Trial {
         let mut rng = Seed::evaluation(number).rng(Stream::Choices);

@@ -23,7 +23,7 @@ const GONE_LIMIT: Duration = Duration::from_secs(5);
 /// Reads per port and exchange: a flood on one port must not stop the simulation.
 const READS_AT_ONCE: usize = 64;
 
-/// Somewhere else and on its own clock: a board, an emulator or a companion computer behind one port for the
+/// A pilot on its own clock: a board, an emulator or a companion computer behind one port for the
 /// autopilot's link and one for the radio's reports. Without the second, the reports come by `TUNNEL` on the first.
 pub struct Wired {
     autopilot: Port,
@@ -60,7 +60,7 @@ impl Wired {
         self.autopilot.state() == State::Up
     }
 
-    /// Reopens ports that went down; call it some times a second.
+    /// Reopens closed ports; call it several times a second.
     pub fn maintain(&mut self, now: time::Instant) {
         // A closed port is no error here: `is_up` reports it.
         for port in [Some(&mut self.autopilot), self.radio.as_mut()].into_iter().flatten() {

@@ -132,7 +132,7 @@ fn straight_cells_are_flown_at_the_set_speed_and_stops_do_not_overshoot() {
                 );
             }
             if speed_mps < 5.0 {
-                // A slot of hovering is so long there that it costs more than two moves: the flight goes home instead.
+                // A slot of hovering costs more than two moves there, so the flight goes home instead.
                 continue;
             }
             let Flown { overshoot_m, hover_off_m, .. } = flown(plan, true);

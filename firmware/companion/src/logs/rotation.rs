@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Files kept beside the current one.
 const KEPT: u32 = 8;
-/// The free space is looked up again after so many bytes.
+/// Bytes between two checks of the free space.
 const LOOK_EVERY: u64 = 64 * 1024;
 
 /// How much of the disk a log may take.
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn old_files_are_deleted_for_room_and_then_nothing_is_written() {
-        // So many bytes are free as files are missing.
+        // Each missing file frees one byte.
         fn nearly_full(folder: &Path) -> io::Result<u64> {
             Ok(10 - fs::read_dir(folder)?.count() as u64)
         }

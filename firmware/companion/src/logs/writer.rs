@@ -7,14 +7,14 @@ use std::thread::JoinHandle;
 /// Records that wait for a slow disk: minutes of decisions, seconds of telemetry.
 const RECORDS_WAITING: usize = 1024;
 
-/// A change that is reported to the operator. The flight goes on in every case.
+/// A change that is reported to the operator. The flight continues in every case.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LogNews {
     /// Records are lost because the disk is full or broken; the text says why.
     Failing(&'static str, String),
     /// Records are lost because the disk is slow.
     Slow(&'static str),
-    /// Records are written again after so many were lost.
+    /// Records are written again; this many were lost.
     Writing(&'static str, u64),
 }
 

@@ -33,7 +33,7 @@ pub struct Router {
 }
 
 impl Router {
-    /// A router between so many ports.
+    /// A router between this number of ports.
     pub fn new(ports: usize) -> Router {
         Router { ports, seen: HashMap::new(), recent: VecDeque::new(), loops: 0 }
     }

@@ -229,7 +229,7 @@ impl Flight {
         }
     }
 
-    /// The flight goes on without a log; the operator gets a text.
+    /// The flight continues without a log; the operator gets a text.
     fn report_logs(&mut self) {
         while let Ok(news) = self.logs.news.try_recv() {
             match news {

@@ -41,7 +41,7 @@ impl Decider {
         self.count
     }
 
-    /// A mission begins: with the next decision the look-ahead forgets plan and channel.
+    /// Begins a mission: with the next decision the look-ahead discards plan and channel.
     pub(crate) const fn begin_mission(&mut self) {
         self.begins = true;
         self.fell_back = false;

@@ -302,7 +302,7 @@ impl Reader<'_> {
             }
             if low.x > high.x || low.y > high.y {
                 return Err(
-                    self.fault(allowed, "allowed wants the south-west cell first, then the north-east")
+                    self.fault(allowed, "allowed needs the south-west cell first, then the north-east")
                 );
             }
             for at in grid.cells() {

@@ -112,7 +112,7 @@ pub fn encode(mission: &Mission) -> ImageBytes {
     image
 }
 
-/// Reads an image. The mission is what was written; whether it can be flown, [`Mission::check`] tells.
+/// Reads an image. It does not check whether the mission can be flown: see [`Mission::check`].
 ///
 /// # Errors
 /// See [`ImageError`].

@@ -316,6 +316,12 @@ impl<P: Deliberator> Onboard<P> {
         &self.policy
     }
 
+    /// Ends the pilot. The policy can serve another one.
+    #[must_use]
+    pub fn into_policy(self) -> P {
+        self.policy
+    }
+
     /// How long the last inference took, measured by the program (a clock is an input); sent as `infer_us`.
     pub fn set_inference_time(&mut self, took: Duration) {
         self.inference_time = Some(took);

@@ -304,7 +304,7 @@ impl Flight {
     }
 
     /// One decision for the end of the present leg, which the aircraft has reached or will reach: of the policy, of the
-    /// guard on the way home, or the reason why the guard goes on alone.
+    /// guard on the way home, or the reason why the guard continues without the policy.
     fn decide<D: Deliberator>(
         &mut self,
         scene: &Scene<'_>,

@@ -13,7 +13,7 @@ use crate::{Fault, ReturnReason, TakeOver};
 /// What a state's step comes to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Outcome {
-    /// The state goes on.
+    /// The state continues.
     Stay,
     /// The request is over.
     Idle,

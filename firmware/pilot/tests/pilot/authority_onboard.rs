@@ -8,7 +8,7 @@ use gleaner_units::Duration;
 use mavlink::dialects::ardupilotmega as dialect;
 use mavlink::dialects::ardupilotmega::{MavCmd, MavResult};
 
-/// The values of a parameter that the pilot told.
+/// The values of a parameter that the pilot reported.
 fn told(bench: &Bench, name: &str) -> Vec<f32> {
     let all = bench.all::<dialect::PARAM_VALUE_DATA>();
     all.iter().filter(|data| data.param_id.to_str() == Ok(name)).map(|data| data.param_value).collect()
@@ -37,7 +37,7 @@ fn a_set_that_is_repeated_after_a_take_over_engages_nothing() {
     bench.heartbeat();
     bench.run(1);
     assert_eq!(bench.onboard.state(), State::Passive);
-    assert_eq!(told(&bench, "GLN_ENABLE"), [0.0], "the truth is shown without being asked for");
+    assert_eq!(told(&bench, "GLN_ENABLE"), [0.0], "the change is sent without a request");
     bench.mode = 4;
     bench.run(2);
     set_enable(&mut bench, 1.0);

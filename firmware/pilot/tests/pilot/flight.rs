@@ -1,4 +1,4 @@
-//! The regular flight: decisions, legs, the ledger, landing, what is told.
+//! The regular flight: decisions, legs, the ledger, landing, telemetry.
 
 use crate::rig::{DOWN_M, Rig, START, TERMINAL, mission};
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode};

@@ -169,7 +169,7 @@ fn a_knob_sets_the_preference_for_everyone_to_see() {
         (echo.map(|data| data.param_value), bench.onboard.parameters().data_weight())
     };
     assert_eq!(turn(1750), (Some(0.75), 0.75));
-    assert_eq!(turn(1756), (None, 0.75), "jitter is told to nobody");
+    assert_eq!(turn(1756), (None, 0.75), "jitter is not reported");
     assert_eq!(turn(1000), (Some(0.0), 0.0));
 }
 

@@ -159,7 +159,7 @@ fn shadow_decides_and_commands_nothing() {
     assert_eq!(decision.battery, BatteryUnits(30.0), "the measured charge within the budget");
     rig.policy.fails = true;
     rig.run(10.0);
-    assert_eq!(rig.said("policy failed"), 1, "told once");
+    assert_eq!(rig.said("policy failed"), 1, "reported once");
     assert!(rig.setpoints.is_empty() && rig.commands.is_empty());
 }
 

@@ -83,7 +83,7 @@ fn a_silent_autopilot_is_a_fault_and_is_asked_to_return_when_it_is_back_in_our_m
     rig.vehicle.mode = None;
     rig.run(10.0);
     assert_eq!(rig.machine.fault(), Some(Fault::AutopilotLost));
-    assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 0, "nobody would hear it");
+    assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 0, "the link is cut");
     rig.vehicle.mode = Some(FlightMode::Guided);
     rig.run(10.0);
     assert_eq!(rig.commanded(AutopilotCommand::ReturnToLaunch), 1);

@@ -17,9 +17,9 @@ use rand_chacha::ChaCha8Rng;
 const WANDER_TIME_S: f64 = 8.0;
 /// Correlation time of a gust.
 const GUST_TIME_S: f64 = 3.0;
-/// The random processes advance once in so many ticks.
+/// Ticks between two steps of the random processes.
 const NOISE_TICKS: u32 = 10;
-/// Acceleration per m/s of gust, 1/s: what the controller has to work against.
+/// Acceleration per m/s of gust, 1/s: what the controller must compensate.
 const GUST_PUSH_PER_S: f64 = 0.1;
 /// Rate at which an [`AircraftFault::AltitudeLoss`] pulls the aircraft down, m/s.
 const SINK_MPS: f64 = 6.0;

@@ -21,20 +21,20 @@ pub enum AircraftFault {
     Voltage(f32),
     /// The pack loses charge.
     ChargeLost(BatteryUnits),
-    /// The autopilot does not know the battery percentage for so long: it reports -1.
+    /// The battery percentage is unknown for this time: the autopilot reports -1.
     BatteryUnknown(Duration),
     /// Flying takes this many times the nominal power.
     Consumption(f32),
     /// The wind changes.
     Wind(Wind),
-    /// The estimator reports its position as untrusted for so long.
+    /// The estimator reports its position as untrusted for this time.
     EstimatorUntrusted(Duration),
     /// The estimator's origin moves by metres north and east: from now on, the same local coordinates are another
     /// place.
     OriginShift([f32; 2]),
-    /// The position estimate is off by metres north and east for so long, as after a GNSS jump.
+    /// The position estimate is off by these metres north and east for this time, as after a GNSS jump.
     PositionJump([f32; 2], Duration),
-    /// The aircraft sinks by so many metres before its controller wins.
+    /// The aircraft sinks by this height, m, before its controller recovers.
     AltitudeLoss(f32),
     /// A circular fence of the autopilot around home is enabled, radius in metres.
     Fence(f32),

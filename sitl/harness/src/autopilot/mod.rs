@@ -24,9 +24,14 @@ mod motion;
 mod parameters;
 mod ports;
 pub(crate) mod px4;
+mod requests;
+mod stack;
 mod streams;
+mod targets;
+mod telemetry;
 #[cfg(test)]
 mod testbench;
+mod vehicle;
 
 pub use battery::{EnergyModel, Pack};
 pub use fault::{AircraftFault, Wind};
@@ -63,8 +68,8 @@ impl AutopilotKind {
     #[must_use]
     pub fn boot(self, settings: AircraftSettings) -> Box<dyn Autopilot> {
         match self {
-            AutopilotKind::ArduPilot => Box::new(ardupilot::ArduCopter::new(settings)),
-            AutopilotKind::Px4 => Box::new(px4::Px4::new(settings)),
+            AutopilotKind::ArduPilot => Box::new(stack::power_on::<ardupilot::ArduCopter>(settings)),
+            AutopilotKind::Px4 => Box::new(stack::power_on::<px4::Px4>(settings)),
         }
     }
 }

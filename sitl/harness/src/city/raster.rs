@@ -40,7 +40,7 @@ pub(crate) fn rasterise(footprints: &[Footprint], placement: Placement) -> Raste
         let mut inside = false;
         for y in rows {
             for x in columns.clone() {
-                // A hair smaller than the cell: a wall on the edge belongs to one side only.
+                // Slightly smaller than the cell, so that a wall on the edge belongs to one side only.
                 let edge = 1e-3 * cell_m;
                 let low = Coord { x: f64::from(x) * cell_m + edge, y: f64::from(y) * cell_m + edge };
                 let high = Coord { x: low.x + cell_m - 2.0 * edge, y: low.y + cell_m - 2.0 * edge };

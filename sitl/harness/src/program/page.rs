@@ -106,7 +106,7 @@ impl Page {
         });
     }
 
-    /// Sends what the page commands to the vehicle, and causes the incidents that it asks for.
+    /// Sends what the page commands to the vehicle, and injects the incidents that it requests.
     fn turn(
         &mut self,
         simulation: &mut Simulation,

@@ -292,7 +292,7 @@ mod tests {
         }
     }
 
-    /// Hovers in RD; after ten seconds the pack loses so many units.
+    /// Hovers in RD; after ten seconds the pack loses this many units.
     fn hovering(lost: f32) -> FlightResult {
         let plan = MissionPlan::new(ScenarioKind::ReachDestination, 4);
         let setup = MissionSetup::new(Arc::new(World::default_world()), plan).unwrap();

@@ -7,8 +7,8 @@
 //!     |                          |  engage request         v another station's targets in force
 //!     +-- (boot)                 +---------------------- Other
 //! ```
-//! Time is that of delivery: what the pilot could not know is not held against it. Evidence, though, has the time at
-//! which it left the autopilot.
+//! Changes of custody count from the time of delivery, because the pilot cannot react before it. Evidence counts from the
+//! time at which it left the autopilot.
 
 use super::rules::Rule;
 use crate::autopilot::{AutopilotKind, Commander, Truth, VehicleMode};
@@ -21,7 +21,7 @@ use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, MavState, PARAM_SET_DATA, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 
-/// Who may move the aircraft, as far as the pilot can know.
+/// Who may move the aircraft, by what was delivered to the pilot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Holder {
     Unclaimed,
@@ -48,7 +48,7 @@ pub(super) struct Custody {
     system_id: u8,
     component_id: u8,
     holder: Holder,
-    /// The last heartbeat that showed GUIDED or OFFBOARD left the autopilot then.
+    /// When the last heartbeat in GUIDED or OFFBOARD left the autopilot.
     evidence_at: Option<Instant>,
     /// Commands need evidence that is newer than this: the end of a stall.
     evidence_after: Instant,
@@ -62,11 +62,11 @@ pub(super) struct Custody {
 
 /// Heartbeats are a second apart; half a second for the line.
 const EVIDENCE_AGE_S: f32 = 1.5;
-/// A request to engage expires after 60 s; the rest is for the climb of the test's own timing.
+/// A request to engage expires after 60 s; the rest is the referee's tolerance.
 const REQUEST_AGE_S: f32 = 75.0;
-/// A target that is in force for so long was reported to the pilot at least twice (5 Hz).
+/// A target that is in force for this time was reported to the pilot at least twice (5 Hz).
 const REPORTED_S: f32 = 0.5;
-/// Targets of another station must be noticed after so long.
+/// The pilot must have noticed the targets of another station after this time.
 const FOREIGN_TARGET_S: f32 = 5.0;
 
 impl Custody {
@@ -89,7 +89,7 @@ impl Custody {
         Duration::from_secs_f32(seconds * self.speedup)
     }
 
-    /// Whether somebody else has had the aircraft since the last request to engage.
+    /// Whether the aircraft was taken over since the last request to engage.
     pub fn is_revoked(&self) -> bool {
         self.holder == Holder::Other
     }
@@ -164,7 +164,7 @@ impl Custody {
         self.own_request = None;
     }
 
-    /// The program does not run until then: what arrived meanwhile is no evidence.
+    /// The program does not run until `until`. What arrives meanwhile is no evidence.
     pub fn stalled_until(&mut self, until: Instant) {
         self.evidence_after = until;
     }

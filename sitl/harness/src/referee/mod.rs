@@ -59,7 +59,7 @@ struct Excursions {
 }
 
 impl Referee {
-    /// Between a position and the decision made of it lies one interval of the 10 Hz stream: a metre at 10 m/s. Half a
+    /// Between a position and the decision that uses it lies one interval of the 10 Hz stream: a metre at 10 m/s. Half a
     /// metre more for the steps of the simulation.
     const POSITION_AGE_M: f32 = 1.5;
     /// How far the aircraft may be behind the moving target when the pilot decides ahead, m.
@@ -68,7 +68,7 @@ impl Referee {
     const OVERSHOOT_M: f32 = 2.0;
     /// The pilot holds its altitude within centimetres; a climb to it ends within 3 m.
     const ALTITUDE_BAND_M: f32 = 5.0;
-    /// A gust or a loss of thrust may push the aircraft out of the band for so long, s.
+    /// A gust or a loss of thrust may push the aircraft out of the band for this time, s.
     const ALTITUDE_GRACE_S: f32 = 10.0;
     /// Battery units of descent and landing at the nominal price, with a margin.
     const LANDING_UNITS: f32 = 14.0;
@@ -160,11 +160,11 @@ impl Referee {
         let cell = self.frame.cell(&truth.position);
         let moves = cell.and_then(|cell| self.envelope.moves(cell)).unwrap_or(0.0).max(2.0);
         let needed = (moves + Referee::LANDING_UNITS) * self.true_price;
-        // A quarter more: the price must be learned before it can be kept.
+        // A quarter more: until the pilot has learned the new price, it plans with the old one.
         truth.battery.0 >= 1.25 * needed + self.parameters.reserve().0
     }
 
-    /// A decision record passed by. Whether it is one that is flown, and so begins a slot.
+    /// A decision record was sent. Whether the decision is flown, and so begins a slot.
     pub fn decided(&mut self, now: Instant, record: &DecisionRecord, truth: &Truth) -> bool {
         if let Some(expected) = self.expected.filter(|&expected| expected != record.sequence) {
             self.violated(now, Rule::RecordMissing { expected, came: record.sequence });
@@ -214,7 +214,7 @@ impl Referee {
         }
     }
 
-    /// Looks at the aircraft; call it once per step.
+    /// Checks the aircraft; call it once per step.
     pub fn watch(&mut self, now: Instant, truth: &Truth) {
         self.custody.watch(now, truth);
         let airborne = !truth.on_ground;
@@ -237,7 +237,7 @@ impl Referee {
         }
     }
 
-    /// Whether the aircraft still does what the pilot wanted: GUIDED, or its own LAND or RTL.
+    /// Whether the aircraft follows the pilot: GUIDED, or the LAND or RTL that the pilot requested.
     fn flies(&self, truth: &Truth) -> bool {
         match truth.mode {
             VehicleMode::Guided => !self.custody.is_revoked(),
@@ -290,7 +290,7 @@ impl Referee {
             self.landed = true;
         } else if truth.mode != VehicleMode::Return && self.could_return && now >= self.disturbed_until {
             // Handed back to the autopilot, it may return to where it took off. With too little energy for the way,
-            // landing where it is is right.
+            // it may land at once.
             self.violated(now, Rule::LandedElsewhere { cell });
         }
     }
@@ -305,7 +305,7 @@ impl Referee {
         &self.violations
     }
 
-    /// Whether somebody else has had the aircraft since the last request to engage.
+    /// Whether the aircraft was taken over since the last request to engage.
     #[must_use]
     pub fn is_revoked(&self) -> bool {
         self.custody.is_revoked()

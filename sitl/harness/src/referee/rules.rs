@@ -64,19 +64,19 @@ pub enum Rule {
         /// The cell under it, if any.
         cell: Option<Cell>,
     },
-    /// A position target left after another mode was delivered to the pilot, and without a new request to engage.
+    /// A position target was sent after another mode had been delivered to the pilot, without a new request to engage.
     TargetAfterTakeOver,
-    /// A command that moves the aircraft left in the same situation.
+    /// A command that moves the aircraft was sent in the same situation.
     CommandAfterTakeOver,
     /// A position target replaced those of another station, which had been in force for seconds.
     OverwroteTarget,
     /// Targets were streamed while PX4 reported a failsafe: they would end it.
     StreamInFailsafe,
-    /// A command that moves the aircraft left without a recent heartbeat in our mode.
+    /// A command that moves the aircraft was sent without a recent heartbeat in GUIDED or OFFBOARD.
     StaleEvidence,
     /// The pilot asked the autopilot for GUIDED or OFFBOARD.
     AskedForGuided,
-    /// The pilot decided for the aircraft after somebody else had taken it.
+    /// The pilot decided for the aircraft after a take-over.
     TookItBack,
     /// The pilot moved the aircraft without any request to engage.
     NeverAsked,
@@ -114,7 +114,7 @@ impl fmt::Display for Rule {
             Rule::StreamInFailsafe => write!(f, "streamed targets during a failsafe"),
             Rule::StaleEvidence => write!(f, "sent a command without a recent heartbeat in our mode"),
             Rule::AskedForGuided => write!(f, "asked the autopilot for GUIDED by itself"),
-            Rule::TookItBack => write!(f, "decided for an aircraft that somebody else has"),
+            Rule::TookItBack => write!(f, "decided for an aircraft that was taken over"),
             Rule::NeverAsked => write!(f, "moved the aircraft without a request to engage"),
             Rule::RequestExpired => write!(f, "engaged on an expired request"),
             Rule::NotANumber => write!(f, "sent a target that is not a number"),

@@ -2,9 +2,9 @@
 
 use super::super::battery::Level;
 use super::super::guidance::Guidance;
+use super::super::telemetry::{self, Telemetry};
 use super::super::{AutopilotKind, LinkId, VehicleMode};
 use super::ArduCopter;
-use gleaner_units::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 
@@ -38,46 +38,14 @@ const SENSOR_PREARM: u32 = 0x1000_0000;
 const BASE_MODE: u8 = 0x51;
 const BASE_MODE_GUIDED: u8 = 0x59;
 const BASE_MODE_ARMED: u8 = 0x80;
-const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 
 impl ArduCopter {
-    /// Sends what is due.
-    pub(super) fn report(&mut self) {
-        if self.now >= self.next_heartbeat {
-            self.next_heartbeat = self.next_heartbeat + HEARTBEAT_INTERVAL;
-            self.send_heartbeats();
-        }
-        for link in LinkId::ALL {
-            while let Some(message_id) = self.ports.due(link, self.now) {
-                self.send_by_id(link, message_id);
-            }
-        }
-    }
-
-    /// On every link.
-    pub(super) fn send_heartbeats(&mut self) {
-        let guided = matches!(self.mode, VehicleMode::Guided | VehicleMode::Return | VehicleMode::Land);
-        let base = if guided { BASE_MODE_GUIDED } else { BASE_MODE };
-        let armed = if self.armed { BASE_MODE_ARMED } else { 0 };
-        let data = HEARTBEAT_DATA {
-            custom_mode: self.mode.custom_mode(AutopilotKind::ArduPilot).unwrap_or(0),
-            mavtype: MavType::MAV_TYPE_QUADROTOR,
-            autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
-            base_mode: MavModeFlag::from_bits_retain(base | armed),
-            system_status: self.system_status(),
-            mavlink_version: 3,
-        };
-        for link in LinkId::ALL {
-            self.ports.send(link, &data);
-        }
-    }
-
     fn system_status(&self) -> MavState {
-        if self.airframe.battery.level > Level::Fine || self.estimator_failsafe() {
+        if self.vehicle.airframe.battery.level > Level::Fine || self.vehicle.lost_position() {
             MavState::MAV_STATE_CRITICAL
-        } else if self.airframe.home.is_none() {
+        } else if self.vehicle.airframe.home.is_none() {
             MavState::MAV_STATE_BOOT
-        } else if self.airframe.on_ground {
+        } else if self.vehicle.airframe.on_ground {
             MavState::MAV_STATE_STANDBY
         } else {
             MavState::MAV_STATE_ACTIVE
@@ -86,72 +54,13 @@ impl ArduCopter {
 
     pub(super) fn announce_origin_and_home(&mut self) {
         for link in LinkId::ALL {
-            self.send_by_id(link, GPS_GLOBAL_ORIGIN_DATA::ID);
-            self.send_by_id(link, HOME_POSITION_DATA::ID);
-        }
-    }
-
-    /// Sends one message of this kind; whether there is one. Without an origin there is no position.
-    pub(super) fn send_by_id(&mut self, link: LinkId, message_id: u32) -> bool {
-        let now = self.now;
-        match message_id {
-            AUTOPILOT_VERSION_DATA::ID => self.ports.send(link, &version()),
-            SYS_STATUS_DATA::ID => self.ports.send(link, &self.sys_status()),
-            SYSTEM_TIME_DATA::ID => {
-                let time_boot_ms = now.as_boot_ms();
-                self.ports.send(link, &SYSTEM_TIME_DATA { time_boot_ms, time_unix_usec: 0 });
-            }
-            GPS_RAW_INT_DATA::ID => self.ports.send(link, &self.airframe.gps_message(now)),
-            ATTITUDE_DATA::ID => self.ports.send(link, &self.airframe.attitude_message(now)),
-            NAV_CONTROLLER_OUTPUT_DATA::ID => self.ports.send(link, &self.navigation()),
-            RC_CHANNELS_DATA::ID => self.ports.send(link, &self.rc()),
-            VFR_HUD_DATA::ID => self.ports.send(link, &self.airframe.hud_message()),
-            BATTERY_STATUS_DATA::ID => self.ports.send(link, &self.battery_status()),
-            EKF_STATUS_REPORT_DATA::ID => self.ports.send(link, &self.estimator()),
-            EXTENDED_SYS_STATE_DATA::ID => self.ports.send(link, &self.landed()),
-            _ => return self.airframe.send_position(&mut self.ports, link, now, self.guidance, message_id),
-        }
-        true
-    }
-
-    fn sys_status(&self) -> SYS_STATUS_DATA {
-        let battery = &self.airframe.battery;
-        let low = battery.level > Level::Fine;
-        let healthy = SENSORS & !if low { SENSOR_BATTERY } else { 0 };
-        SYS_STATUS_DATA {
-            onboard_control_sensors_present: MavSysStatusSensor::from_bits_retain(SENSORS),
-            onboard_control_sensors_enabled: MavSysStatusSensor::from_bits_retain(SENSORS),
-            onboard_control_sensors_health: MavSysStatusSensor::from_bits_retain(healthy),
-            load: 300,
-            voltage_battery: (battery.voltage_v * 1000.0) as u16,
-            current_battery: battery.current_ca(),
-            battery_remaining: battery.percent(self.now),
-            ..SYS_STATUS_DATA::DEFAULT
-        }
-    }
-
-    fn battery_status(&self) -> BATTERY_STATUS_DATA {
-        let battery = &self.airframe.battery;
-        let mut voltages = [u16::MAX; 10];
-        voltages[0] = (battery.voltage_v * 1000.0) as u16;
-        BATTERY_STATUS_DATA {
-            current_consumed: battery.consumed_mah(),
-            energy_consumed: -1,
-            temperature: i16::MAX,
-            voltages,
-            current_battery: battery.current_ca(),
-            battery_remaining: battery.percent(self.now),
-            charge_state: match battery.level {
-                Level::Fine => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_OK,
-                Level::Low => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_LOW,
-                _ => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_CRITICAL,
-            },
-            ..BATTERY_STATUS_DATA::DEFAULT
+            telemetry::send_by_id(self, link, GPS_GLOBAL_ORIGIN_DATA::ID);
+            telemetry::send_by_id(self, link, HOME_POSITION_DATA::ID);
         }
     }
 
     fn estimator(&self) -> EKF_STATUS_REPORT_DATA {
-        let ready = self.airframe.estimator_ready(self.now);
+        let ready = self.vehicle.airframe.estimator_ready(self.vehicle.now);
         let flags = if ready { ESTIMATOR_TRUSTED } else { ESTIMATOR_STARTING };
         EKF_STATUS_REPORT_DATA {
             velocity_variance: 0.02,
@@ -162,19 +71,10 @@ impl ArduCopter {
         }
     }
 
-    fn landed(&self) -> EXTENDED_SYS_STATE_DATA {
-        let landed_state = match self.guidance {
-            _ if self.airframe.on_ground => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
-            Guidance::Descend(_) => MavLandedState::MAV_LANDED_STATE_LANDING,
-            _ => MavLandedState::MAV_LANDED_STATE_IN_AIR,
-        };
-        EXTENDED_SYS_STATE_DATA { landed_state, ..EXTENDED_SYS_STATE_DATA::DEFAULT }
-    }
-
     fn navigation(&self) -> NAV_CONTROLLER_OUTPUT_DATA {
-        let away_m = match self.guidance {
+        let away_m = match self.vehicle.guidance {
             Guidance::Target(target) => {
-                let [north, east, _] = self.airframe.body.position;
+                let [north, east, _] = self.vehicle.airframe.body.position;
                 let [to_north, to_east] = [target.position[0] - north, target.position[1] - east];
                 (to_north * to_north + to_east * to_east).sqrt()
             }
@@ -182,11 +82,73 @@ impl ArduCopter {
         };
         NAV_CONTROLLER_OUTPUT_DATA { wp_dist: away_m as u16, ..NAV_CONTROLLER_OUTPUT_DATA::DEFAULT }
     }
+}
+
+impl Telemetry for ArduCopter {
+    fn heartbeat(&self) -> HEARTBEAT_DATA {
+        let guided =
+            matches!(self.vehicle.mode, VehicleMode::Guided | VehicleMode::Return | VehicleMode::Land);
+        let base = if guided { BASE_MODE_GUIDED } else { BASE_MODE };
+        let armed = if self.vehicle.armed { BASE_MODE_ARMED } else { 0 };
+        HEARTBEAT_DATA {
+            custom_mode: self.vehicle.mode.custom_mode(AutopilotKind::ArduPilot).unwrap_or(0),
+            mavtype: MavType::MAV_TYPE_QUADROTOR,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+            base_mode: MavModeFlag::from_bits_retain(base | armed),
+            system_status: self.system_status(),
+            mavlink_version: 3,
+        }
+    }
+
+    fn sys_status(&self) -> SYS_STATUS_DATA {
+        let battery = &self.vehicle.airframe.battery;
+        let low = battery.level > Level::Fine;
+        let healthy = SENSORS & !if low { SENSOR_BATTERY } else { 0 };
+        SYS_STATUS_DATA {
+            onboard_control_sensors_present: MavSysStatusSensor::from_bits_retain(SENSORS),
+            onboard_control_sensors_enabled: MavSysStatusSensor::from_bits_retain(SENSORS),
+            onboard_control_sensors_health: MavSysStatusSensor::from_bits_retain(healthy),
+            load: 300,
+            voltage_battery: (battery.voltage_v * 1000.0) as u16,
+            current_battery: battery.current_ca(),
+            battery_remaining: battery.percent(self.vehicle.now),
+            ..SYS_STATUS_DATA::DEFAULT
+        }
+    }
+
+    fn battery_status(&self) -> BATTERY_STATUS_DATA {
+        let battery = &self.vehicle.airframe.battery;
+        let mut voltages = [u16::MAX; 10];
+        voltages[0] = (battery.voltage_v * 1000.0) as u16;
+        BATTERY_STATUS_DATA {
+            current_consumed: battery.consumed_mah(),
+            energy_consumed: -1,
+            temperature: i16::MAX,
+            voltages,
+            current_battery: battery.current_ca(),
+            battery_remaining: battery.percent(self.vehicle.now),
+            charge_state: match battery.level {
+                Level::Fine => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_OK,
+                Level::Low => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_LOW,
+                _ => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_CRITICAL,
+            },
+            ..BATTERY_STATUS_DATA::DEFAULT
+        }
+    }
+
+    fn landed(&self) -> EXTENDED_SYS_STATE_DATA {
+        let landed_state = match self.vehicle.guidance {
+            _ if self.vehicle.airframe.on_ground => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
+            Guidance::Descend(_) => MavLandedState::MAV_LANDED_STATE_LANDING,
+            _ => MavLandedState::MAV_LANDED_STATE_IN_AIR,
+        };
+        EXTENDED_SYS_STATE_DATA { landed_state, ..EXTENDED_SYS_STATE_DATA::DEFAULT }
+    }
 
     /// Sticks centred, mode switch low.
     fn rc(&self) -> RC_CHANNELS_DATA {
         RC_CHANNELS_DATA {
-            time_boot_ms: self.now.as_boot_ms(),
+            time_boot_ms: self.vehicle.now.as_boot_ms(),
             chan1_raw: 1500,
             chan2_raw: 1500,
             chan3_raw: 1500,
@@ -200,15 +162,19 @@ impl ArduCopter {
             ..RC_CHANNELS_DATA::DEFAULT
         }
     }
-}
 
-fn version() -> AUTOPILOT_VERSION_DATA {
-    AUTOPILOT_VERSION_DATA {
-        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT,
-        // 4.6.3, official release.
-        flight_sw_version: 0x0406_03FF,
-        ..AUTOPILOT_VERSION_DATA::DEFAULT
+    fn send_own(&mut self, link: LinkId, message_id: u32) -> bool {
+        match message_id {
+            NAV_CONTROLLER_OUTPUT_DATA::ID => {
+                let data = self.navigation();
+                self.vehicle.ports.send(link, &data);
+            }
+            EKF_STATUS_REPORT_DATA::ID => {
+                let data = self.estimator();
+                self.vehicle.ports.send(link, &data);
+            }
+            _ => return false,
+        }
+        true
     }
 }

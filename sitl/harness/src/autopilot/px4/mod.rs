@@ -18,23 +18,22 @@
 //! - **After landing** it stays in the mode in which it landed, disarmed; in OFFBOARD without a stream it refuses to
 //!   arm.
 
-mod commands;
 mod modes;
+mod requests;
+mod stack;
+mod targets;
 mod telemetry;
 #[cfg(test)]
 mod tests;
 
-use super::airframe::Airframe;
-use super::guidance::{Guidance, Profile};
-use super::motion::{Response, SpeedLimits};
+use super::guidance::Profile;
+use super::motion::SpeedLimits;
 use super::parameters::{Defaults, ParameterTable};
-use super::ports::Ports;
-use super::{AircraftFault, AircraftSettings, Autopilot, Commander, LinkId, Truth, VehicleMode};
+use super::vehicle::Vehicle;
 use gleaner_units::{Duration, Instant};
 use mavlink::dialects::ardupilotmega::MavParamType::{
     MAV_PARAM_TYPE_INT32 as I32, MAV_PARAM_TYPE_REAL32 as F32,
 };
-use mavlink::dialects::ardupilotmega::MavSeverity;
 
 /// Defaults of PX4 1.18 on its SIH quadrotor.
 pub(super) const DEFAULTS: Defaults = &[
@@ -57,8 +56,6 @@ pub(super) const DEFAULTS: Defaults = &[
     ("GF_MAX_HOR_DIST", 0.0, F32),
 ];
 
-/// From power on to the first heartbeat after a reboot.
-const BOOT_TIME: Duration = Duration::from_secs(3);
 /// From the take-off command to leaving the ground: 30.3 s to 60 m were measured.
 const SPIN_UP: Duration = Duration::from_millis(8_450);
 /// Ground speed never exceeded 10.1 m/s on a leg of 200 m, with `MPC_XY_VEL_MAX` 12.
@@ -79,85 +76,14 @@ struct Tuning {
 /// The simulated autopilot with its aircraft.
 #[derive(Debug)]
 pub(crate) struct Px4 {
-    /// The last boot, on the clock that [`Autopilot::step`] is given.
-    booted_at: Instant,
-    now: Instant,
-    up_from: Instant,
-    ports: Ports,
-    parameters: ParameterTable,
+    vehicle: Vehicle,
     tuning: Tuning,
-    airframe: Airframe,
-    mode: VehicleMode,
-    mode_by: Commander,
-    guidance: Guidance,
-    armed: bool,
-    armed_at: Instant,
-    /// The last position target of any kind, and the companion's or a ground station's.
+    /// The last position target of any kind, from the companion or from a ground station.
     target_at: Option<Instant>,
     /// OFFBOARD was left because the targets stopped: resuming targets bring it back.
     offboard_lost: bool,
     /// A failsafe is active, reported by the heartbeat.
     failsafe: bool,
-    next_heartbeat: Instant,
-    ignored_targets: u32,
-}
-
-impl Px4 {
-    /// An autopilot at boot, on the ground, in HOLD.
-    pub fn new(settings: AircraftSettings) -> Px4 {
-        let mut parameters = ParameterTable::new(DEFAULTS);
-        parameters.set("MAV_SYS_ID", f32::from(settings.system_id));
-        Px4::boot(Airframe::new(settings, Response::PX4), parameters)
-    }
-
-    fn boot(airframe: Airframe, parameters: ParameterTable) -> Px4 {
-        let tuning = tuning(&parameters);
-        let mut px4 = Px4 {
-            booted_at: Instant::ZERO,
-            now: Instant::ZERO,
-            up_from: Instant::ZERO,
-            ports: Ports::new(airframe.settings.system_id, telemetry::STREAMABLE),
-            parameters,
-            tuning,
-            airframe,
-            mode: VehicleMode::Hold,
-            mode_by: Commander::Autopilot,
-            guidance: Guidance::Halt,
-            armed: false,
-            armed_at: Instant::ZERO,
-            target_at: None,
-            offboard_lost: false,
-            failsafe: false,
-            next_heartbeat: Instant::ZERO,
-            ignored_targets: 0,
-        };
-        px4.start_streams();
-        px4
-    }
-
-    fn reboot(&mut self) {
-        let settings = self.airframe.settings;
-        // Swapped out only to move its parts into the next boot.
-        let before = std::mem::replace(self, Px4::new(settings));
-        *self = Px4 {
-            booted_at: before.booted_at + (before.now - Instant::ZERO),
-            up_from: Instant::ZERO + BOOT_TIME,
-            next_heartbeat: Instant::ZERO + BOOT_TIME,
-            ignored_targets: before.ignored_targets,
-            ..Px4::boot(before.airframe.rebooted(), before.parameters)
-        };
-    }
-
-    fn set_own_parameter(&mut self, name: &str, value: f32) -> Option<usize> {
-        let index = self.parameters.set(name, value)?;
-        self.tuning = tuning(&self.parameters);
-        Some(index)
-    }
-
-    /// `STATUSTEXT`: none reached the companion link in measured runs.
-    fn say(&mut self, severity: MavSeverity, text: &str) {
-        self.ports.say(&[LinkId::GROUND, LinkId::CREW], severity, text);
-    }
 }
 
 fn tuning(parameters: &ParameterTable) -> Tuning {
@@ -184,65 +110,5 @@ fn tuning(parameters: &ParameterTable) -> Tuning {
         battery_action: parameters.value("COM_LOW_BAT_ACT") as u32,
         disarm_delay: seconds("COM_DISARM_PRFLT"),
         fence_radius_m: parameters.value("GF_MAX_HOR_DIST"),
-    }
-}
-
-impl Autopilot for Px4 {
-    fn step(&mut self, now: Instant) {
-        self.advance(now);
-    }
-
-    fn receive(&mut self, link: LinkId, mut bytes: &[u8]) {
-        loop {
-            let (rest, frame) = self.ports.receive(link, bytes);
-            let Some(frame) = frame else { return };
-            bytes = rest;
-            self.handle(link, &frame);
-        }
-    }
-
-    fn transmit(&mut self, link: LinkId) -> Vec<Vec<u8>> {
-        self.ports.transmit(link)
-    }
-
-    fn pilot_selects(&mut self, mode: VehicleMode) {
-        self.enter(mode, Commander::Operator);
-    }
-
-    fn inject(&mut self, fault: AircraftFault) {
-        match fault {
-            AircraftFault::Reboot => self.reboot(),
-            AircraftFault::PilotSelects(mode) => self.pilot_selects(mode),
-            AircraftFault::Fence(radius_m) => {
-                self.set_own_parameter("GF_MAX_HOR_DIST", radius_m);
-            }
-            _ => self.airframe.inject(self.now, fault),
-        }
-    }
-
-    fn set_parameter(&mut self, name: &str, value: f32) -> bool {
-        self.set_own_parameter(name, value).is_some()
-    }
-
-    fn truth(&self) -> Truth {
-        let position = self.airframe.true_position();
-        Truth {
-            position,
-            ground_speed_mps: self.airframe.body.ground_speed_mps() as f32,
-            height_m: self.airframe.settings.stand.down_m - position.down_m,
-            armed: self.armed,
-            on_ground: self.airframe.on_ground,
-            mode: self.mode,
-            mode_by: self.mode_by,
-            target_by: self.guidance.target_by(),
-            battery: self.airframe.battery.left(),
-            killed_by_nan: false,
-            is_up: self.now >= self.up_from,
-            ignored_targets: self.ignored_targets,
-        }
-    }
-
-    fn settings(&self) -> &AircraftSettings {
-        &self.airframe.settings
     }
 }

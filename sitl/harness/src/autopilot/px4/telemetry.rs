@@ -1,9 +1,9 @@
 //! Messages that the autopilot sends.
 
 use super::super::battery::Level;
+use super::super::telemetry::Telemetry;
 use super::super::{AutopilotKind, LinkId, VehicleMode};
 use super::Px4;
-use gleaner_units::Duration;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 
@@ -28,7 +28,7 @@ pub(super) const STREAMABLE: &[u32] = &[
     EXTENDED_SYS_STATE_DATA::ID,
 ];
 
-/// Rates on the companion link unless asked otherwise, Hz.
+/// Default rates on the companion link, Hz.
 const UNASKED: [(u32, f32); 10] = [
     (LOCAL_POSITION_NED_DATA::ID, 30.0),
     // The measured 100 Hz is above the simulation's tick.
@@ -59,99 +59,70 @@ const SENSORS: u32 = 0x2F | 0x20_0000 | 0x200_0000;
 /// `MAV_MODE_FLAG`: custom mode, stabilised, guided, auto; armed on top.
 const BASE_MODE: u8 = 0x1D;
 const BASE_MODE_ARMED: u8 = 0x80;
-const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Px4 {
     pub(super) fn start_streams(&mut self) {
         for (message_id, rate_hz) in UNASKED {
-            self.ports.streams(LinkId::COMPANION).set(self.now, message_id, 1e6 / rate_hz);
+            self.vehicle.ports.streams(LinkId::COMPANION).set(self.vehicle.now, message_id, 1e6 / rate_hz);
         }
         for link in [LinkId::GROUND, LinkId::CREW] {
             for (message_id, rate_hz) in UNASKED_GROUND {
-                self.ports.streams(link).set(self.now, message_id, 1e6 / rate_hz);
+                self.vehicle.ports.streams(link).set(self.vehicle.now, message_id, 1e6 / rate_hz);
             }
         }
     }
 
     /// `SET_MESSAGE_INTERVAL`: 0 is the default rate, -1 is off.
-    pub(super) fn set_interval(&mut self, link: LinkId, message_id: u32, interval_us: f32) -> bool {
+    pub(super) fn set_interval_or_default(
+        &mut self,
+        link: LinkId,
+        message_id: u32,
+        interval_us: f32,
+    ) -> bool {
         let unasked = if link == LinkId::COMPANION { &UNASKED[..] } else { &UNASKED_GROUND[..] };
         let default = unasked.iter().find(|(id, _)| *id == message_id).map(|(_, rate_hz)| 1e6 / rate_hz);
         let interval_us = if interval_us == 0.0 { default.unwrap_or(-1.0) } else { interval_us };
-        self.ports.streams(link).set(self.now, message_id, interval_us)
-    }
-
-    /// Sends what is due. Nothing leaves while it boots.
-    pub(super) fn report(&mut self) {
-        if self.now < self.up_from {
-            return;
-        }
-        if self.now >= self.next_heartbeat {
-            self.next_heartbeat = self.next_heartbeat + HEARTBEAT_INTERVAL;
-            self.send_heartbeats();
-        }
-        for link in LinkId::ALL {
-            while let Some(message_id) = self.ports.due(link, self.now) {
-                self.send_by_id(link, message_id);
-            }
-        }
-    }
-
-    fn send_heartbeats(&mut self) {
-        let armed = if self.armed { BASE_MODE_ARMED } else { 0 };
-        let data = HEARTBEAT_DATA {
-            custom_mode: self.mode.custom_mode(AutopilotKind::Px4).unwrap_or(0),
-            mavtype: MavType::MAV_TYPE_QUADROTOR,
-            autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
-            base_mode: MavModeFlag::from_bits_retain(BASE_MODE | armed),
-            system_status: self.system_status(),
-            mavlink_version: 3,
-        };
-        for link in LinkId::ALL {
-            self.ports.send(link, &data);
-        }
+        self.vehicle.ports.streams(link).set(self.vehicle.now, message_id, interval_us)
     }
 
     fn system_status(&self) -> MavState {
         if self.failsafe {
             MavState::MAV_STATE_CRITICAL
-        } else if self.airframe.home.is_none() {
+        } else if self.vehicle.airframe.home.is_none() {
             MavState::MAV_STATE_BOOT
-        } else if self.armed {
+        } else if self.vehicle.armed {
             MavState::MAV_STATE_ACTIVE
         } else {
             MavState::MAV_STATE_STANDBY
         }
     }
 
-    /// Sends one message of this kind; whether there is one.
-    pub(super) fn send_by_id(&mut self, link: LinkId, message_id: u32) -> bool {
-        let now = self.now;
-        match message_id {
-            AUTOPILOT_VERSION_DATA::ID => self.ports.send(link, &version()),
-            SYS_STATUS_DATA::ID => self.ports.send(link, &self.sys_status()),
-            SYSTEM_TIME_DATA::ID => {
-                let time_boot_ms = now.as_boot_ms();
-                self.ports.send(link, &SYSTEM_TIME_DATA { time_boot_ms, time_unix_usec: 0 });
-            }
-            GPS_RAW_INT_DATA::ID => self.ports.send(link, &self.airframe.gps_message(now)),
-            ATTITUDE_DATA::ID => self.ports.send(link, &self.airframe.attitude_message(now)),
-            VFR_HUD_DATA::ID => self.ports.send(link, &self.airframe.hud_message()),
-            BATTERY_STATUS_DATA::ID => self.ports.send(link, &self.battery_status()),
-            ESTIMATOR_STATUS => self.ports.send(link, &self.estimator()),
-            EXTENDED_SYS_STATE_DATA::ID => self.ports.send(link, &self.landed()),
-            RC_CHANNELS_DATA::ID => {
-                // No RC receiver is connected in the measured configuration.
-                let time_boot_ms = now.as_boot_ms();
-                self.ports.send(link, &RC_CHANNELS_DATA { time_boot_ms, ..RC_CHANNELS_DATA::DEFAULT });
-            }
-            _ => return self.airframe.send_position(&mut self.ports, link, now, self.guidance, message_id),
+    fn estimator(&self) -> ESTIMATOR_STATUS_DATA {
+        let ready = self.vehicle.airframe.estimator_ready(self.vehicle.now);
+        let flags = if ready { ESTIMATOR_TRUSTED } else { ESTIMATOR_STARTING };
+        ESTIMATOR_STATUS_DATA {
+            time_usec: self.vehicle.now.as_micros(),
+            flags: EstimatorStatusFlags::from_bits_retain(flags),
+            ..ESTIMATOR_STATUS_DATA::DEFAULT
         }
-        true
+    }
+}
+
+impl Telemetry for Px4 {
+    fn heartbeat(&self) -> HEARTBEAT_DATA {
+        let armed = if self.vehicle.armed { BASE_MODE_ARMED } else { 0 };
+        HEARTBEAT_DATA {
+            custom_mode: self.vehicle.mode.custom_mode(AutopilotKind::Px4).unwrap_or(0),
+            mavtype: MavType::MAV_TYPE_QUADROTOR,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_PX4,
+            base_mode: MavModeFlag::from_bits_retain(BASE_MODE | armed),
+            system_status: self.system_status(),
+            mavlink_version: 3,
+        }
     }
 
     fn sys_status(&self) -> SYS_STATUS_DATA {
-        let battery = &self.airframe.battery;
+        let battery = &self.vehicle.airframe.battery;
         SYS_STATUS_DATA {
             onboard_control_sensors_present: MavSysStatusSensor::from_bits_retain(SENSORS),
             onboard_control_sensors_enabled: MavSysStatusSensor::from_bits_retain(SENSORS),
@@ -159,13 +130,13 @@ impl Px4 {
             load: 300,
             voltage_battery: 16_200,
             current_battery: -1,
-            battery_remaining: battery.percent(self.now),
+            battery_remaining: battery.percent(self.vehicle.now),
             ..SYS_STATUS_DATA::DEFAULT
         }
     }
 
     fn battery_status(&self) -> BATTERY_STATUS_DATA {
-        let battery = &self.airframe.battery;
+        let battery = &self.vehicle.airframe.battery;
         let mut voltages = [u16::MAX; 10];
         voltages[..4].fill(4_050);
         BATTERY_STATUS_DATA {
@@ -174,7 +145,7 @@ impl Px4 {
             temperature: i16::MAX,
             voltages,
             current_battery: -1,
-            battery_remaining: battery.percent(self.now),
+            battery_remaining: battery.percent(self.vehicle.now),
             charge_state: match battery.level {
                 Level::Fine => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_OK,
                 Level::Low => MavBatteryChargeState::MAV_BATTERY_CHARGE_STATE_LOW,
@@ -185,33 +156,27 @@ impl Px4 {
         }
     }
 
-    fn estimator(&self) -> ESTIMATOR_STATUS_DATA {
-        let ready = self.airframe.estimator_ready(self.now);
-        let flags = if ready { ESTIMATOR_TRUSTED } else { ESTIMATOR_STARTING };
-        ESTIMATOR_STATUS_DATA {
-            time_usec: self.now.as_micros(),
-            flags: EstimatorStatusFlags::from_bits_retain(flags),
-            ..ESTIMATOR_STATUS_DATA::DEFAULT
-        }
-    }
-
     fn landed(&self) -> EXTENDED_SYS_STATE_DATA {
-        let landed_state = match self.mode {
-            _ if self.airframe.on_ground => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
+        let landed_state = match self.vehicle.mode {
+            _ if self.vehicle.airframe.on_ground => MavLandedState::MAV_LANDED_STATE_ON_GROUND,
             VehicleMode::TakeOff => MavLandedState::MAV_LANDED_STATE_TAKEOFF,
             VehicleMode::Land => MavLandedState::MAV_LANDED_STATE_LANDING,
             _ => MavLandedState::MAV_LANDED_STATE_IN_AIR,
         };
         EXTENDED_SYS_STATE_DATA { landed_state, ..EXTENDED_SYS_STATE_DATA::DEFAULT }
     }
-}
 
-fn version() -> AUTOPILOT_VERSION_DATA {
-    AUTOPILOT_VERSION_DATA {
-        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED,
-        // 1.18.0, official release.
-        flight_sw_version: 0x0112_00FF,
-        ..AUTOPILOT_VERSION_DATA::DEFAULT
+    /// No RC receiver is connected in the measured configuration.
+    fn rc(&self) -> RC_CHANNELS_DATA {
+        RC_CHANNELS_DATA { time_boot_ms: self.vehicle.now.as_boot_ms(), ..RC_CHANNELS_DATA::DEFAULT }
+    }
+
+    fn send_own(&mut self, link: LinkId, message_id: u32) -> bool {
+        if message_id != ESTIMATOR_STATUS {
+            return false;
+        }
+        let data = self.estimator();
+        self.vehicle.ports.send(link, &data);
+        true
     }
 }

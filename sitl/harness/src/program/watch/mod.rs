@@ -89,7 +89,7 @@ impl Follower {
     }
 }
 
-/// What the person at the keyboard wants.
+/// What a key requests.
 enum Wish {
     None,
     Speed(f32),
