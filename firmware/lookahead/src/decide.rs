@@ -152,7 +152,7 @@ impl<const D: usize> LookAhead<D> {
         self.evidence = [0.0; D];
         self.overrides = 0;
         self.rng = XorShiftRng::seed_from_u64(seed);
-        self.initial_units = devices.iter().map(|device| finite(device.remaining)).sum();
+        self.initial_units = devices.iter().map(|device| device.remaining_units()).sum();
         self.has_map = sight.is_some() && devices.len() <= D;
         if let Some(sight) = sight.filter(|_| self.has_map) {
             self.links.survey(sight, devices.iter().map(|device| device.cell));
@@ -248,11 +248,11 @@ impl<const D: usize> LookAhead<D> {
 
     /// The present state, with the transmission that follows from live SNR in this slot.
     pub(crate) fn state(&self, view: &View<'_>) -> State<D> {
-        let data = view.devices.iter().map(|device| finite(device.remaining));
+        let data = view.devices.iter().map(|device| device.remaining_units());
         let mut state = State::new(view.cell, view.battery, data);
         let heard = view.devices.iter().enumerate().filter_map(|(index, device)| {
-            let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| *snr_db >= self.channel.threshold_db)?;
-            (finite(device.remaining) > 0.0).then_some((index, snr_db))
+            let snr_db = device.snr_db().filter(|snr_db| *snr_db >= self.channel.threshold_db)?;
+            (device.remaining_units() > 0.0).then_some((index, snr_db))
         });
         let strongest = heard.reduce(|best, next| if next.1 > best.1 { next } else { best });
         state.present = strongest
@@ -283,9 +283,7 @@ impl<const D: usize> LookAhead<D> {
         let cell_m2 = self.links.grid().cell().0 * self.links.grid().cell().0;
         let height_m2 = self.links.altitude().0 * self.links.altitude().0;
         for (device, heard) in view.devices.iter().enumerate() {
-            let Some(snr_db) = heard.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite()) else {
-                continue;
-            };
+            let Some(snr_db) = heard.snr_db() else { continue };
             let (dx, dy) = (heard.cell.x.abs_diff(view.cell.x), heard.cell.y.abs_diff(view.cell.y));
             let squared_cells = f32::from(dx) * f32::from(dx) + f32::from(dy) * f32::from(dy);
             let log10_m = 0.5 * libm::log10f((squared_cells * cell_m2 + height_m2).max(1.0));
@@ -369,8 +367,4 @@ impl<const D: usize> Plan<D> {
             }
         }
     }
-}
-
-fn finite(units: f32) -> f32 {
-    if units.is_finite() { units.max(0.0) } else { 0.0 }
 }

@@ -45,6 +45,20 @@ pub struct DeviceState {
     pub snr: Option<Db>,
 }
 
+impl DeviceState {
+    /// SNR of a fresh report, dB. One that is not finite counts as missing.
+    #[must_use]
+    pub fn snr_db(&self) -> Option<f32> {
+        self.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite())
+    }
+
+    /// Data still to collect, data units. A figure that is not finite or is negative counts as 0.
+    #[must_use]
+    pub fn remaining_units(&self) -> f32 {
+        if self.remaining.is_finite() { self.remaining.max(0.0) } else { 0.0 }
+    }
+}
+
 /// Everything that a decision depends on, except the devices.
 #[derive(Clone, Copy)]
 pub struct Situation<'a> {

@@ -61,13 +61,13 @@ impl Tokens {
         for (index, device) in (0..=u16::MAX).zip(devices) {
             outlook.add(&device);
             let [east_m, north_m] = offset_m(device.cell);
-            let snr_db = device.snr.map(|snr| snr.0).filter(|snr_db| snr_db.is_finite());
+            let snr_db = device.snr_db();
             let reachable = snr_db.is_some_and(|snr_db| snr_db >= REACHABLE_SNR_DB);
             let [vantage_east_m, vantage_north_m] = outlook.vantage(device.cell).map(|cells| cells * cell_m);
             let token = [
                 east_m,
                 north_m,
-                if device.remaining.is_finite() { device.remaining.max(0.0) } else { 0.0 },
+                device.remaining_units(),
                 snr_db.unwrap_or(SNR_NOT_HEARD_DB),
                 f32::from(u8::from(reachable)),
                 vantage_east_m,

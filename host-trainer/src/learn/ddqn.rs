@@ -13,6 +13,7 @@ use crate::learn::algorithm::{
     Algorithm, OBJECTIVES, Scratch, TrainedNetwork, TransitionOf, VALUES, bootstrap_discount,
     learning_reward, scalarise,
 };
+use crate::learn::constants::CONSTANTS;
 use crate::net::{self, Architecture};
 use crate::observe::Encoding;
 use crate::settings::{Settings, interpolate};
@@ -21,11 +22,6 @@ use gleaner_units::{Action, ActionMask};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// Share of random actions at the start of the annealing (uniform exploration, as in most implementations).
-const EPSILON_START: f32 = 1.0;
-/// Share of random actions after the annealing.
-const EPSILON_END: f32 = 0.05;
 
 /// The networks and the state of the optimiser.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -117,7 +113,7 @@ impl<E: Encoding> Algorithm for Ddqn<E> {
 }
 
 fn epsilon(settings: &Settings, update: u64) -> f32 {
-    interpolate(EPSILON_START, EPSILON_END, settings.annealed(update))
+    interpolate(CONSTANTS.epsilon_start, CONSTANTS.epsilon_end, settings.annealed(update))
 }
 
 impl<E: Encoding> Ddqn<E> {

@@ -4,6 +4,7 @@
 //! from its own flights. All three are a [`trainer::Trainer`].
 
 pub mod algorithm;
+mod constants;
 pub mod ddqn;
 pub mod distil;
 pub mod mosac;

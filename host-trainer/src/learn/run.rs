@@ -9,6 +9,7 @@ use crate::judge::validation::{Tables, Validation};
 use crate::keep::checkpoint::CheckpointError;
 use crate::keep::snapshot::{LAST, Snapshot};
 use crate::learn::algorithm::{Algorithm, Inference};
+use crate::learn::constants::CONSTANTS;
 use crate::learn::n_step::NStep;
 use crate::learn::policy::NetworkPolicy;
 use crate::learn::replay::{Replay, Transition};
@@ -27,11 +28,6 @@ use std::path::Path;
 
 /// File name of the checkpoint inside the output folder.
 pub const CHECKPOINT: &str = "run.checkpoint";
-/// Step size of the running average of the policy's parameters, per update. The average is what is evaluated and
-/// exported, since single updates are noisy. It does not influence the training. The paper has none.
-const AVERAGING: f32 = 0.001;
-/// Share of the slots of a guided mission that GREEDY decides; the policy explores in the others. The paper has none.
-const GUIDED_SLOTS: f64 = 0.9;
 
 /// What an algorithm's encoding stores of a state.
 type State<A> = <<A as Algorithm>::Encoding as Encoding>::Observation;
@@ -227,7 +223,7 @@ impl<A: Algorithm> OffPolicyRun<A> {
                 A::explore(&self.settings, self.update, &scores, mask)
             };
             let explored = policy.sample(self.rng.random());
-            let is_guided = !uniform && self.rng.random_bool(GUIDED_SLOTS);
+            let is_guided = !uniform && self.rng.random_bool(CONSTANTS.guided_slots);
             let action = active.guide_action().filter(|_| is_guided).unwrap_or(explored);
             for transition in active.transitions(&self.encoding, before, action) {
                 self.replay.push(transition);
@@ -278,7 +274,7 @@ impl<A: Algorithm> Trainer for OffPolicyRun<A> {
             self.algorithm.update(&self.encoding, &self.settings, self.update, &transitions, &preferences);
         self.update += 1;
         // A plain mean at first, so that the initial parameters soon have no weight.
-        let share = AVERAGING.max(1.0 / self.update as f32);
+        let share = CONSTANTS.averaging.max(1.0 / self.update as f32);
         net::polyak(&mut self.averaged, self.algorithm.policy_parameters(), share);
         Ok(losses)
     }
