@@ -25,6 +25,7 @@ mod parameters;
 mod ports;
 pub(crate) mod px4;
 mod requests;
+mod simulated;
 mod stack;
 mod streams;
 mod targets;
@@ -68,8 +69,8 @@ impl AutopilotKind {
     #[must_use]
     pub fn boot(self, settings: AircraftSettings) -> Box<dyn Autopilot> {
         match self {
-            AutopilotKind::ArduPilot => Box::new(stack::power_on::<ardupilot::ArduCopter>(settings)),
-            AutopilotKind::Px4 => Box::new(stack::power_on::<px4::Px4>(settings)),
+            AutopilotKind::ArduPilot => Box::new(simulated::power_on::<ardupilot::ArduCopter>(settings)),
+            AutopilotKind::Px4 => Box::new(simulated::power_on::<px4::Px4>(settings)),
         }
     }
 }

@@ -8,17 +8,6 @@ use mavlink::dialects::ardupilotmega::*;
 
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(1);
 
-/// The messages that each flight stack fills in its own way.
-pub(super) trait Telemetry {
-    fn heartbeat(&self) -> HEARTBEAT_DATA;
-    fn sys_status(&self) -> SYS_STATUS_DATA;
-    fn battery_status(&self) -> BATTERY_STATUS_DATA;
-    fn landed(&self) -> EXTENDED_SYS_STATE_DATA;
-    fn rc(&self) -> RC_CHANNELS_DATA;
-    /// Sends a message that only this stack has. Whether there is one of this kind.
-    fn send_own(&mut self, link: LinkId, message_id: u32) -> bool;
-}
-
 /// Sends what is due. Nothing leaves while the autopilot boots.
 pub(super) fn send_due<S: FlightStack>(stack: &mut S) {
     let vehicle = stack.vehicle_mut();

@@ -2,9 +2,9 @@
 
 use super::airframe::Airframe;
 use super::guidance::Guidance;
-use super::parameters::ParameterTable;
+use super::motion::Response;
+use super::parameters::{Defaults, ParameterTable};
 use super::ports::Ports;
-use super::stack::FlightStack;
 use super::{AircraftSettings, Commander, Truth, VehicleMode};
 use gleaner_units::{Duration, Instant};
 
@@ -12,6 +12,20 @@ use gleaner_units::{Duration, Instant};
 const BOOT_TIME: Duration = Duration::from_secs(3);
 /// How long the estimator may report its position as untrusted before a mode that needs a position ends.
 const ESTIMATOR_FAILSAFE: Duration = Duration::from_secs(1);
+
+/// Constants of the vehicles with one flight stack.
+pub(super) struct VehicleModel {
+    /// Parameters with their default values.
+    pub defaults: Defaults,
+    /// Parameter of the MAVLink system id.
+    pub system_id: &'static str,
+    /// How the aircraft follows a target.
+    pub response: Response,
+    /// Messages that are sent at a rate or on request.
+    pub streamable: &'static [u32],
+    /// Mode after a boot, and who is said to have selected it.
+    pub first_mode: (VehicleMode, Commander),
+}
 
 /// The state that does not depend on the flight stack.
 #[derive(Debug)]
@@ -35,13 +49,13 @@ pub(super) struct Vehicle {
 }
 
 impl Vehicle {
-    fn at_boot<S: FlightStack>(airframe: Airframe, parameters: ParameterTable) -> Vehicle {
-        let (mode, mode_by) = S::FIRST_MODE;
+    fn at_boot(model: &VehicleModel, airframe: Airframe, parameters: ParameterTable) -> Vehicle {
+        let (mode, mode_by) = model.first_mode;
         Vehicle {
             booted_at: Instant::ZERO,
             now: Instant::ZERO,
             up_from: Instant::ZERO,
-            ports: Ports::new(airframe.settings.system_id, S::STREAMABLE),
+            ports: Ports::new(airframe.settings.system_id, model.streamable),
             parameters,
             airframe,
             mode,
@@ -55,21 +69,21 @@ impl Vehicle {
     }
 
     /// A vehicle with default parameters at its first boot, on the ground.
-    pub fn new<S: FlightStack>(settings: AircraftSettings) -> Vehicle {
-        let mut parameters = ParameterTable::new(S::DEFAULTS);
-        parameters.set(S::SYSTEM_ID, f32::from(settings.system_id));
-        Vehicle::at_boot::<S>(Airframe::new(settings, S::RESPONSE), parameters)
+    pub fn new(model: &VehicleModel, settings: AircraftSettings) -> Vehicle {
+        let mut parameters = ParameterTable::new(model.defaults);
+        parameters.set(model.system_id, f32::from(settings.system_id));
+        Vehicle::at_boot(model, Airframe::new(settings, model.response), parameters)
     }
 
     /// The same aircraft, with its parameters, at the next boot of its autopilot.
-    pub fn rebooted<S: FlightStack>(self) -> Vehicle {
+    pub fn rebooted(self, model: &VehicleModel) -> Vehicle {
         let up_from = Instant::ZERO + BOOT_TIME;
         Vehicle {
             booted_at: self.booted_at + (self.now - Instant::ZERO),
             up_from,
             next_heartbeat: up_from,
             ignored_targets: self.ignored_targets,
-            ..Vehicle::at_boot::<S>(self.airframe.rebooted(), self.parameters)
+            ..Vehicle::at_boot(model, self.airframe.rebooted(), self.parameters)
         }
     }
 

@@ -3,9 +3,9 @@
 use super::super::battery::Level;
 use super::super::guidance::{Guidance, Profile};
 use super::super::motion::{Response, SpeedLimits};
-use super::super::parameters::{Defaults, Parameter};
+use super::super::parameters::Parameter;
 use super::super::stack::FlightStack;
-use super::super::vehicle::Vehicle;
+use super::super::vehicle::{Vehicle, VehicleModel};
 use super::super::{Commander, LinkId, VehicleMode};
 use super::requests::{REQUEST_DATA_STREAM, SET_MODE, name};
 use super::{ArduCopter, DEFAULTS, telemetry, tuning};
@@ -17,11 +17,13 @@ use mavlink::dialects::ardupilotmega::MavResult::{self, *};
 use mavlink::dialects::ardupilotmega::*;
 
 impl FlightStack for ArduCopter {
-    const DEFAULTS: Defaults = DEFAULTS;
-    const SYSTEM_ID: &'static str = "SYSID_THISMAV";
-    const RESPONSE: Response = Response::ARDUCOPTER;
-    const STREAMABLE: &'static [u32] = telemetry::STREAMABLE;
-    const FIRST_MODE: (VehicleMode, Commander) = (VehicleMode::Stabilize, Commander::Operator);
+    const MODEL: VehicleModel = VehicleModel {
+        defaults: DEFAULTS,
+        system_id: "SYSID_THISMAV",
+        response: Response::ARDUCOPTER,
+        streamable: telemetry::STREAMABLE,
+        first_mode: (VehicleMode::Stabilize, Commander::Operator),
+    };
     const TEXT_LINKS: &'static [LinkId] = &LinkId::ALL;
     const REFUSED: MavResult = MAV_RESULT_FAILED;
     const NO_MESSAGE: MavResult = MAV_RESULT_FAILED;

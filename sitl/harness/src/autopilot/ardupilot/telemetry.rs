@@ -2,7 +2,8 @@
 
 use super::super::battery::Level;
 use super::super::guidance::Guidance;
-use super::super::telemetry::{self, Telemetry};
+use super::super::stack::Telemetry;
+use super::super::telemetry;
 use super::super::{AutopilotKind, LinkId, VehicleMode};
 use super::ArduCopter;
 use mavlink::MessageData;

@@ -4,9 +4,9 @@ use super::super::battery::Level;
 use super::super::guidance::{Guidance, Profile};
 use super::super::messages::ORIGIN_AMSL_MM;
 use super::super::motion::Response;
-use super::super::parameters::{Defaults, Parameter};
+use super::super::parameters::Parameter;
 use super::super::stack::FlightStack;
-use super::super::vehicle::Vehicle;
+use super::super::vehicle::{Vehicle, VehicleModel};
 use super::super::{AutopilotKind, Commander, LinkId, VehicleMode};
 use super::{DEFAULTS, Px4, telemetry, tuning};
 use crate::wire;
@@ -17,11 +17,13 @@ use mavlink::dialects::ardupilotmega::MavResult::{self, *};
 use mavlink::dialects::ardupilotmega::*;
 
 impl FlightStack for Px4 {
-    const DEFAULTS: Defaults = DEFAULTS;
-    const SYSTEM_ID: &'static str = "MAV_SYS_ID";
-    const RESPONSE: Response = Response::PX4;
-    const STREAMABLE: &'static [u32] = telemetry::STREAMABLE;
-    const FIRST_MODE: (VehicleMode, Commander) = (VehicleMode::Hold, Commander::Autopilot);
+    const MODEL: VehicleModel = VehicleModel {
+        defaults: DEFAULTS,
+        system_id: "MAV_SYS_ID",
+        response: Response::PX4,
+        streamable: telemetry::STREAMABLE,
+        first_mode: (VehicleMode::Hold, Commander::Autopilot),
+    };
     // No text reached the companion link in measured runs.
     const TEXT_LINKS: &'static [LinkId] = &[LinkId::GROUND, LinkId::CREW];
     const REFUSED: MavResult = MAV_RESULT_TEMPORARILY_REJECTED;

@@ -1,7 +1,7 @@
 //! Messages that the autopilot sends.
 
 use super::super::battery::Level;
-use super::super::telemetry::Telemetry;
+use super::super::stack::Telemetry;
 use super::super::{AutopilotKind, LinkId, VehicleMode};
 use super::Px4;
 use mavlink::MessageData;
