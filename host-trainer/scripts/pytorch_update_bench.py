@@ -53,13 +53,16 @@ def batch():
     return [torch.rand(*size) for size in sizes]
 
 
-def learner():
-    """Returns a function that makes one update."""
+def learner(compiled=False):
+    """Returns a function that makes one update; `compiled` has the networks compiled by TorchInductor."""
     actor = Network(ACTIONS)
     critics = [Network(ACTIONS * OBJECTIVES) for _ in range(2)]
     targets = [Network(ACTIONS * OBJECTIVES) for _ in range(2)]
     for target, critic in zip(targets, critics):
         target.load_state_dict(critic.state_dict())
+    if compiled:
+        for network in [actor, *critics, *targets]:
+            network.compile(dynamic=False)
     adams = [torch.optim.Adam(net.parameters(), lr=1e-4, fused=True) for net in [actor, *critics]]
     before, after = batch(), batch()
     action = torch.randint(ACTIONS, (SAMPLES,))

@@ -1,13 +1,15 @@
 """Times pymavlink on a stream of packets.
 
-usage: wire_bench.py STREAM ROUNDS
+usage: wire_bench.py STREAM
 
-Prints two lines of ROUNDS numbers: microseconds per packet read, and per packet written.
+Contenders, see rounds.py: `read` (microseconds per packet of the stream) and `write` (per position target).
 """
 
 import sys
 import time
 
+import pymavlink
+import rounds
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 READ_BYTES = 512
@@ -36,14 +38,13 @@ def write():
     return (time.perf_counter() - start) * 1e6 / WRITTEN
 
 
-def main(path, rounds):
+def main(path):
     with open(path, "rb") as file:
         stream = file.read()
-    print(*(read(stream) for _ in range(rounds)))
-    print(*(write() for _ in range(rounds)))
+    rounds.serve(f"pymavlink {pymavlink.__version__}", {"read": lambda: read(stream), "write": write})
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 3:
+    if len(sys.argv) != 2:
         sys.exit(__doc__)
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[1])

@@ -4,11 +4,13 @@
 //! - **image**: the ELF file that is flashed; the emulator boots the same file.
 //! - **lines**: the board's serial lines as loopback connections; the emulator connects.
 
+mod cost;
 mod emulator;
 mod image;
 mod toolchain;
 mod watching;
 
+pub use cost::LookAheadCost;
 pub use emulator::{Emulator, Options, STACK_PAINT, StackUse};
 pub use image::{Image, Section};
 pub use watching::{Heard, heard, named_values};

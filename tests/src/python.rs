@@ -45,10 +45,28 @@ pub fn interpreter() -> Result<PathBuf> {
     let python = environment.join("bin/python");
     let requirements = scripts().join("requirements.txt");
     if !is_complete(&python, &requirements) {
-        make(&environment, &python, &requirements)?;
+        make(&environment, &python, &requirements, &["--no-deps"])?;
     }
     Ok(python)
     // Dropping the file releases the lock.
+}
+
+/// A Python with PyTorch: the one that `GLEANER_TORCH_PYTHON` names, or an environment of its own in the build folder,
+/// installed once: several gigabytes.
+///
+/// # Errors
+/// PyTorch cannot be installed here, with the cause.
+pub fn pytorch() -> Result<PathBuf> {
+    if let Some(python) = std::env::var_os("GLEANER_TORCH_PYTHON") {
+        return Ok(python.into());
+    }
+    let environment = target_folder().join("venv-pytorch");
+    let python = environment.join("bin/python");
+    let requirements = scripts().join("pytorch-requirements.txt");
+    if !is_complete(&python, &requirements) {
+        make(&environment, &python, &requirements, &[])?;
+    }
+    Ok(python)
 }
 
 /// Cargo's target folder; a relative path starts at the workspace's folder.
@@ -76,11 +94,12 @@ for line in open(sys.argv[1]):
             .is_ok_and(|output| output.status.success())
 }
 
-fn make(environment: &Path, python: &Path, requirements: &Path) -> Result<()> {
+fn make(environment: &Path, python: &Path, requirements: &Path, options: &[&str]) -> Result<()> {
     let advice = format!(
-        "python3 -m venv --clear {} && {} -m pip install --no-deps -r {}",
+        "python3 -m venv --clear {} && {} -m pip install {} -r {}",
         environment.display(),
         python.display(),
+        options.join(" "),
         requirements.display()
     );
     let made = Command::new("python3").args(["-m", "venv", "--clear"]).arg(environment).output();
@@ -91,7 +110,9 @@ fn make(environment: &Path, python: &Path, requirements: &Path) -> Result<()> {
     })?;
     succeeded("python3 -m venv", &made, &advice)?;
     let installed = Command::new(python)
-        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "-r"])
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
+        .args(options)
+        .arg("-r")
         .arg(requirements)
         .output()
         .with_context(|| format!("cannot start {}: type: {advice}", python.display()))?;

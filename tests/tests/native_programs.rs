@@ -70,6 +70,7 @@ fn bench_shows_both_engines_side_by_side() {
     let rows: Vec<Vec<f64>> = said
         .lines()
         .skip(3)
+        .take_while(|line| !line.is_empty())
         .map(|line| line.split_whitespace().map(|number| number.parse().unwrap()).collect())
         .collect();
     assert!(!rows.is_empty(), "{said}");
@@ -79,6 +80,11 @@ fn bench_shows_both_engines_side_by_side() {
         };
         assert!(tract_least <= tract_median && native_least <= native_median && ratio > 0.0, "{said}");
     }
+    let decisions: Vec<&str> = said.lines().skip_while(|line| !line.is_empty()).skip(1).collect();
+    let [title, _, six, twelve, verdict] = decisions[..] else { panic!("{said}") };
+    assert!(title.starts_with("one decision with look-ahead, 1000 tours"), "{said}");
+    assert!(six.trim().starts_with("6 ") && twelve.trim().starts_with("12 "), "{said}");
+    assert!(verdict.contains("a decision is due every 2000 ms"), "{said}");
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub enum Command {
         #[arg(long = "wait", value_name = "SECONDS", default_value_t = 3, value_parser = clap::value_parser!(u64).range(..=3600))]
         wait_s: u64,
     },
-    /// Time one inference in each engine.
+    /// Time one inference in each engine, and whole decisions on this computer. Exits with 1 if it is too slow.
     Bench(Bench),
     /// Convert a model for the native engine and verify the result.
     Convert(Conversion),

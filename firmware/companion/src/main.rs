@@ -3,7 +3,7 @@
 //! The program opens ports and files, hands bytes and the time to [`gleaner_pilot::Onboard`], and sends what comes
 //! back. All decisions are made there.
 //!
-//! Exit codes: 0 done, 1 the verdict is negative (`check`, `replay`), 2 could not run. An error is one line on stderr:
+//! Exit codes: 0 done, 1 the verdict is negative (`check`, `replay`, `bench`), 2 could not run. An error is one line on stderr:
 //! what, where, what to do.
 
 mod args;

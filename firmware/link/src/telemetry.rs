@@ -9,7 +9,7 @@ pub struct Telemetry {
     pub collected: Option<f32>,
     /// `spare_bat`: battery units beyond the way to the terminal and the reserve.
     pub spare_units: Option<f32>,
-    /// `infer_us`: time of the last inference, us.
+    /// `infer_us`: time of the last decision, network and look-ahead, us.
     pub inference_us: Option<f32>,
     /// `attn_dev`: index of the device that the last decision attended to most.
     pub attended_device: Option<f32>,

@@ -48,6 +48,9 @@ pub struct Arguments {
     /// Print one JSON object a row, with the data of each mission.
     #[arg(long)]
     json: bool,
+    /// Fly the nominal row at w = (0, 1) instead, and print how many missions use the least possible energy.
+    #[arg(long, conflicts_with_all = ["row", "json", "times"])]
+    shortest: bool,
 }
 
 fn row(name: &str) -> Result<Row, String> {
@@ -60,6 +63,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let bytes = std::fs::read(&arguments.model).with_context(place)?;
     let mut policy = Engine::load_checked(&bytes, EngineKind::Native).with_context(place)?;
     let budget = Budget { tours: arguments.tours };
+    if arguments.shortest {
+        return shortest(arguments, &mut policy, budget);
+    }
     let rows = if arguments.row.is_empty() { ROWS.to_vec() } else { arguments.row.clone() };
     if !arguments.json {
         println!("{HEADING}");
@@ -82,6 +88,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             } else {
                 println!("{compared}");
             }
+        }
+    }
+    Ok(())
+}
+
+/// Prints the energy of network and look-ahead at w = (0, 1).
+fn shortest(arguments: &Arguments, policy: &mut Engine, budget: Budget) -> Result<()> {
+    println!(
+        "| scenario | | missions with the least energy | mean energy | most energy |\n|---|---|---|---|---|"
+    );
+    for kind in ScenarioKind::ALL {
+        if arguments.scenario.is_some_and(|only| only != kind) {
+            continue;
+        }
+        let setting = Setting { kind, devices: arguments.devices, battery: arguments.battery };
+        let arena = Arena::new(ROWS[0], setting, arguments.realizations)?;
+        let least = arena.least_energy();
+        let flown = arena.energy(policy, budget)?;
+        for (name, energy) in ["network", "look-ahead"].into_iter().zip(flown) {
+            let shortest = energy.iter().zip(&least).filter(|(energy, least)| energy <= least).count();
+            let mean = energy.iter().sum::<f32>() / energy.len().max(1) as f32;
+            let most = energy.iter().copied().fold(0.0, f32::max);
+            println!("| {kind} | {name} | {shortest} of {} | {mean:.3} | {most} |", energy.len());
         }
     }
     Ok(())

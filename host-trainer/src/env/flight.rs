@@ -1,12 +1,12 @@
 //! A mission on the grid under the safety envelope: an episode of the learner.
 
 use gleaner_guard::Guard;
-use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
+use gleaner_policy::{DeviceState, Preference, Situation, TokenTable, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
 use gleaner_world::{City, Episode, Realization, ScenarioError, Seed, Stream, World};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The vector reward of one slot (paper, eq. 14): collected data in percent of the initial data, and minus the energy
 /// in battery units.
@@ -22,7 +22,13 @@ pub struct Flight {
     total: Reward,
     reports: Option<Reports>,
     map: Option<Arc<City>>,
+    table: Option<SharedTable>,
 }
+
+/// What each device can send to each cell of one city, computed once for all flights in it. The tokens are the same with and
+/// without a table, bit for bit.
+#[derive(Clone, Debug, Default)]
+pub struct SharedTable(Arc<Mutex<TokenTable>>);
 
 /// The reports received from the devices, when some are lost.
 #[derive(Clone, Debug)]
@@ -71,6 +77,7 @@ impl Flight {
             total: [0.0; 2],
             reports: None,
             map: None,
+            table: None,
         })
     }
 
@@ -88,6 +95,13 @@ impl Flight {
         self
     }
 
+    /// Looks up coverage in this table, which belongs to the city of this flight.
+    #[must_use]
+    pub fn with_table(mut self, table: &SharedTable) -> Flight {
+        self.table = Some(table.clone());
+        self
+    }
+
     /// Gives the policy this city map in place of the true one: another building map on board.
     ///
     /// # Panics
@@ -96,6 +110,8 @@ impl Flight {
     pub fn with_map(mut self, map: Arc<City>) -> Flight {
         assert_eq!(map.grid(), self.episode.world().city().grid(), "the map must cover the city");
         self.map = Some(map);
+        // It belongs to the true map.
+        self.table = None;
         self
     }
 
@@ -146,7 +162,14 @@ impl Flight {
             preference: self.preference,
             sight: self.map(),
         };
-        Tokens::build(&situation, self.device_states()).0
+        match &self.table {
+            Some(SharedTable(table)) => {
+                // A table is whole after each insertion, also when a thread has panicked in between.
+                let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
+                table.build(&situation, self.device_states()).0
+            }
+            None => Tokens::build(&situation, self.device_states()).0,
+        }
     }
 
     /// Battery beyond what the way to the terminal needs.

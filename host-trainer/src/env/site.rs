@@ -1,5 +1,6 @@
 //! Where missions take place: a world, and the zones and devices of a mission file if there is one.
 
+use super::flight::SharedTable;
 use gleaner_units::{BatteryUnits, Cell};
 use gleaner_world::{Placement, Realization, Scenario, ScenarioError, ScenarioKind, Seed, World};
 use std::sync::Arc;
@@ -20,6 +21,7 @@ pub struct MissionPlan {
 pub struct Site {
     world: Arc<World>,
     plan: Option<MissionPlan>,
+    table: SharedTable,
 }
 
 impl Site {
@@ -31,8 +33,8 @@ impl Site {
 
     /// A world with random devices.
     #[must_use]
-    pub const fn new(world: Arc<World>) -> Site {
-        Site { world, plan: None }
+    pub fn new(world: Arc<World>) -> Site {
+        Site { world, plan: None, table: SharedTable::default() }
     }
 
     /// The same world with the terminal, battery and devices of a mission file.
@@ -44,13 +46,19 @@ impl Site {
     /// The same plan in another world, such as one with another channel.
     #[must_use]
     pub fn in_world(&self, world: Arc<World>) -> Site {
-        Site { world, plan: self.plan.clone() }
+        Site { world, plan: self.plan.clone(), table: SharedTable::default() }
     }
 
     /// City and channel.
     #[must_use]
     pub const fn world(&self) -> &Arc<World> {
         &self.world
+    }
+
+    /// The table of this city for [`Flight::with_table`](super::flight::Flight::with_table).
+    #[must_use]
+    pub const fn table(&self) -> &SharedTable {
+        &self.table
     }
 
     /// The plan's devices; `None` where devices are drawn at random.

@@ -2,7 +2,7 @@
 //! assumes. All at w = (1, 0), where the differences are largest.
 
 use crate::env::flight::Flight;
-use crate::judge::evaluation::{Decider, DeciderError, Engine, fly_all_as, fly_greedy};
+use crate::judge::evaluation::{Decider, DeciderError, Engine, fly_all, fly_all_as, fly_greedy};
 use crate::judge::interval::Interval;
 use crate::judge::lookahead::LookingAhead;
 use crate::judge::mismatch::{MapError, Mismatch};
@@ -135,6 +135,36 @@ impl Arena {
             oracle: Vec::new(),
         };
         Ok((compared, looking.into_times()))
+    }
+
+    /// Energy of each mission at w = (0, 1), battery units: the network's, and with look-ahead.
+    ///
+    /// # Errors
+    /// The policy failed.
+    pub fn energy<P>(&self, policy: &mut P, budget: Budget) -> Result<[Vec<f32>; 2], DeciderError>
+    where
+        P: Policy<Error: Display>,
+    {
+        let fly = |decider: &mut dyn Decider| {
+            let missions = fly_all(&self.world, &self.drawn, &[Preference::ENERGY], decider)?;
+            Ok(missions.0.last().into_iter().flatten().map(|total| -total[1]).collect())
+        };
+        let network = fly(&mut Engine(&mut *policy))?;
+        Ok([network, fly(&mut LookingAhead::new(policy, budget))?])
+    }
+
+    /// The least energy of each mission, battery units: the way to the terminal; out and back where the mission starts
+    /// there, because it ends with a move into the terminal's cell.
+    #[must_use]
+    pub fn least_energy(&self) -> Vec<f32> {
+        let least = |(_, realization): &(Seed, Realization)| match realization
+            .start()
+            .manhattan(realization.terminal())
+        {
+            0 => 2.0,
+            moves => moves as f32,
+        };
+        self.drawn.iter().map(least).collect()
     }
 
     fn fly(&self, decider: &mut dyn Decider) -> Result<Vec<f32>, DeciderError> {

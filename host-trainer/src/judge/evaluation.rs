@@ -1,6 +1,6 @@
 //! The paper's metrics: fixed realizations, eleven preferences, fronts and hypervolumes.
 
-use crate::env::flight::{Flight, Reward};
+use crate::env::flight::{Flight, Reward, SharedTable};
 use crate::env::greedy::Greedy;
 use crate::judge::pareto::{REFERENCE, hypervolume};
 use crate::net::{self, Batch, Sample, Shape, Workspace};
@@ -303,10 +303,11 @@ pub fn fly_all_as(
     prepare: impl Fn(Flight, Seed) -> Flight,
 ) -> Result<Missions, DeciderError> {
     let mut flights: Vec<Flight> = Vec::new();
+    let table = SharedTable::default();
     for &preference in preferences {
         for (seed, realization) in realizations {
             let flight = Flight::new(world, realization, *seed, preference).expect("drawn for this world");
-            flights.push(prepare(flight, *seed));
+            flights.push(prepare(flight.with_table(&table), *seed));
         }
     }
     loop {

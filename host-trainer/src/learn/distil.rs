@@ -203,7 +203,8 @@ impl Distillation {
             mission.realization = self.site.realization(&scenario, mission.seed)?;
             mission.preference = Preference::ENERGY;
         }
-        let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?;
+        let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?
+            .with_table(self.site.table());
         Ok((flight, self.teacher.study(&mission.realization)))
     }
 

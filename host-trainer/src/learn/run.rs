@@ -185,7 +185,8 @@ impl<A: Algorithm> OffPolicyRun<A> {
 
     fn begin(&self, number: u64) -> Result<ActiveFlight<State<A>>, ScenarioError> {
         let mission = self.settings.missions().mission(&self.site, number)?;
-        let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?;
+        let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?
+            .with_table(self.site.table());
         let n_step = NStep::new(self.settings.n_step, self.settings.discount);
         Ok(ActiveFlight { mission: number, actions: Vec::new(), flight, guide: mission.guide, n_step })
     }

@@ -1,5 +1,6 @@
 //! The policy on board: inference in each engine, and the observation.
 
+use super::peer::Peer;
 use super::timing::{Contender, in_turns};
 use crate::observations::random;
 use crate::programs::repository;
@@ -43,34 +44,23 @@ pub(super) fn inference(page: &mut String) -> Result<()> {
         portable: NativePolicy::new(model, &mut workspace),
         tract: TractPolicy::load_checked(&onnx)?,
     };
-    let calls = (REPETITIONS * CALLS).to_string();
-    let mut arguments = vec![path.display().to_string(), calls];
+    let mut arguments = vec![path.display().to_string(), CALLS.to_string()];
     arguments.extend(DEVICES.map(|devices| devices.to_string()));
-    let runtime = python::run("onnxruntime_bench.py", arguments)?;
+    let runtime = RefCell::new(Peer::start(&python::interpreter()?, "onnxruntime_bench.py", &arguments)?);
     writeln!(
         page,
         "## Inference\n\nThe shipped model on one thread, the vectorised engine with {}. Each repetition is {CALLS} calls. \
-         onnxruntime runs from Python, directly before. The row of the batch is the time of one of {BATCH} observations.\n",
-        engines.simd.instruction_set()
+         {} runs from Python. The row of the batch is the time of one of {BATCH} observations.\n",
+        engines.simd.instruction_set(),
+        runtime.borrow().about()
     )?;
-    writeln!(page, "| devices | engine | time | tract / engine |\n|---|---|---|---|")?;
-    let mut lines = runtime.lines();
+    writeln!(
+        page,
+        "| devices | engine | time | onnxruntime / engine | tract / engine |\n|---|---|---|---|---|"
+    )?;
     let mut vectorised = Vec::new();
     for devices in DEVICES {
-        let tokens = sample(devices)?;
-        let line = lines.next().context("onnxruntime_bench.py printed too little")?;
-        let numbers: Vec<f64> = line.split_whitespace().filter_map(|number| number.parse().ok()).collect();
-        let [_, minimum, median] = numbers[..] else {
-            anyhow::bail!("onnxruntime_bench.py printed `{line}`")
-        };
-        let [ours, peer] = engines.alone(page, &tokens)?;
-        writeln!(
-            page,
-            "| {devices} | onnxruntime | {median:.1} us (minimum {minimum:.1}) | {:.2}; onnxruntime / vectorised {:.2} |",
-            peer / median,
-            median / ours
-        )?;
-        vectorised.push(ours);
+        vectorised.push(engines.alone(page, &sample(devices)?, &runtime)?);
     }
     writeln!(
         page,
@@ -83,6 +73,30 @@ pub(super) fn inference(page: &mut String) -> Result<()> {
     Ok(())
 }
 
+/// Calls one engine with twelve devices.
+pub(super) fn count(engine: &str, calls: u64) -> Result<()> {
+    let onnx = std::fs::read(repository().join("models/gleaner.onnx"))?;
+    let tokens = sample(12)?;
+    if engine == "tract" {
+        let mut tract = TractPolicy::load_checked(&onnx)?;
+        (0..calls).for_each(|_| drop(black_box(tract.infer(black_box(&tokens)))));
+        return Ok(());
+    }
+    let blob = AlignedBytes::new(&convert(&onnx, WeightFormat::F32)?);
+    let model = Model::read(blob.as_slice())?;
+    if engine == "portable" {
+        let mut workspace = Workspace::new();
+        let mut portable = NativePolicy::new(model, &mut workspace);
+        (0..calls).for_each(|_| drop(black_box(portable.infer(black_box(&tokens)))));
+        return Ok(());
+    }
+    let mut simd = SimdPolicy::new(&model).context("this processor has no supported vector unit")?;
+    for _ in 0..calls {
+        let _ = black_box(simd.logits(black_box(&tokens)));
+    }
+    Ok(())
+}
+
 /// The engines with the shipped model.
 struct Engines<'a> {
     simd: SimdPolicy,
@@ -91,32 +105,35 @@ struct Engines<'a> {
 }
 
 impl Engines<'_> {
-    /// Each engine in repetitions of its own calls, in turns. Returns the medians of the vectorised engine and of tract.
-    fn alone(&mut self, page: &mut String, tokens: &Tokens) -> Result<[f64; 2]> {
+    /// Each engine in repetitions of its own calls, in turns. Returns the median of the vectorised engine.
+    fn alone(&mut self, page: &mut String, tokens: &Tokens, runtime: &RefCell<Peer>) -> Result<f64> {
         let devices = tokens.devices.len();
         let batch = vec![tokens.clone(); BATCH];
         let simd = RefCell::new(&mut self.simd);
-        let mut contenders: [Contender<'_>; 4] = [
-            (
-                "native, vectorised",
-                Box::new(|| {
-                    let _ = black_box(simd.borrow_mut().logits(black_box(tokens)));
-                }),
-            ),
-            (
-                "native, vectorised, batch",
-                Box::new(|| drop(black_box(simd.borrow_mut().logits_of(black_box(&batch))))),
-            ),
-            ("native, portable", Box::new(|| drop(black_box(self.portable.infer(black_box(tokens)))))),
-            ("tract", Box::new(|| drop(black_box(self.tract.infer(black_box(tokens)))))),
+        let vectorised = || {
+            let _ = black_box(simd.borrow_mut().logits(black_box(tokens)));
+        };
+        let batches = || {
+            let _ = black_box(simd.borrow_mut().logits_of(black_box(&batch)));
+        };
+        let mut contenders = [
+            Contender::ours("native, vectorised", CALLS, vectorised),
+            Contender::ours("native, vectorised, batch", CALLS, batches),
+            Contender::ours("native, portable", CALLS, || {
+                drop(black_box(self.portable.infer(black_box(tokens))))
+            }),
+            Contender::ours("tract", CALLS, || drop(black_box(self.tract.infer(black_box(tokens))))),
+            Contender::peer("onnxruntime", runtime, devices.to_string()),
         ];
-        let mut times = in_turns(&mut contenders, REPETITIONS, CALLS);
+        let mut times = in_turns(&mut contenders, REPETITIONS)?;
         times[1].divide(BATCH as f64);
-        let peer = times.last().context("four contenders")?;
-        for ((name, _), times) in contenders.iter().zip(&times) {
-            writeln!(page, "| {devices} | {name} | {} | {} |", times.text(), times.ratio(peer))?;
+        let [.., tract, onnxruntime] = &times[..] else { anyhow::bail!("five contenders") };
+        for (contender, times) in contenders.iter().zip(&times) {
+            let ratios = [times.ratio(onnxruntime), times.ratio(tract)];
+            let [first, second] = ratios;
+            writeln!(page, "| {devices} | {} | {} | {first} | {second} |", contender.name, times.text())?;
         }
-        Ok([times[0].median(), peer.median()])
+        Ok(times[0].median())
     }
 
     /// The vectorised engine after a pass over other memory, and after an inference of tract.
@@ -130,16 +147,12 @@ impl Engines<'_> {
             [(&name, &mut pass), ("an inference of tract on the same observation", &mut tract)];
         for (name, before) in before {
             let simd = &mut self.simd;
-            let mut contenders: [Contender<'_>; 2] = [
-                ("before", Box::new(before)),
-                (
-                    "native",
-                    Box::new(|| {
-                        let _ = black_box(simd.logits(black_box(tokens)));
-                    }),
-                ),
-            ];
-            let times = in_turns(&mut contenders, REPETITIONS, 1);
+            let inference = || {
+                let _ = black_box(simd.logits(black_box(tokens)));
+            };
+            let mut contenders =
+                [Contender::ours("before", 1, before), Contender::ours("native", 1, inference)];
+            let times = in_turns(&mut contenders, REPETITIONS)?;
             writeln!(page, "| {devices} | {name} | {} | {:.1} |", times[1].text(), times[1].median() / warm)?;
         }
         Ok(())
@@ -177,27 +190,23 @@ pub(super) fn observation(page: &mut String) -> Result<()> {
             })
         };
         let mask = |situation: &Situation<'_>| guard.mask(situation.cell, situation.battery);
-        let mut contenders: [Contender<'_>; 2] = [
-            (
-                "`TokenTable`",
-                Box::new(|| {
-                    let situation = situation(first);
-                    black_box((table.build(&situation, devices(first)), mask(&situation)));
-                    first += 1;
-                }),
-            ),
-            (
-                "`Tokens::build`",
-                Box::new(|| {
-                    let situation = situation(second);
-                    black_box((Tokens::build(&situation, devices(second)), mask(&situation)));
-                    second += 1;
-                }),
-            ),
+        let incremental = || {
+            let situation = situation(first);
+            black_box((table.build(&situation, devices(first)), mask(&situation)));
+            first += 1;
+        };
+        let direct = || {
+            let situation = situation(second);
+            black_box((Tokens::build(&situation, devices(second)), mask(&situation)));
+            second += 1;
+        };
+        let mut contenders = [
+            Contender::ours("`TokenTable`", CALLS, incremental),
+            Contender::ours("`Tokens::build`", CALLS, direct),
         ];
         // The second round over all cells is measured: every vantage is known then.
-        in_turns(&mut contenders, 24, CALLS);
-        let times = in_turns(&mut contenders, REPETITIONS, CALLS);
+        in_turns(&mut contenders, 24)?;
+        let times = in_turns(&mut contenders, REPETITIONS)?;
         let [table, direct] = &times[..] else { anyhow::bail!("two contenders") };
         writeln!(page, "| {count} | `TokenTable` | {} | {} |", table.text(), table.ratio(direct))?;
         writeln!(page, "| {count} | `Tokens::build` | {} | |", direct.text())?;

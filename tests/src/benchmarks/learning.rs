@@ -1,53 +1,50 @@
 //! Updates of the learning algorithm against PyTorch.
 
-use super::timing::in_turns;
-use crate::programs::repository;
+use super::peer::Peer;
+use super::timing::{Contender, in_turns};
 use crate::python;
 use anyhow::Result;
+use std::cell::RefCell;
 use std::fmt::Write;
-use std::process::Command;
 
 #[path = "../../../host-trainer/benches/twin/mod.rs"]
 mod twin;
 
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 15;
 const UPDATES: usize = 2;
 
 /// One update of MOSAC: 96 samples, three networks.
 pub(super) fn updates(page: &mut String) -> Result<()> {
     let mut twin = twin::Twin::new();
-    in_turns(&mut [("warm-up", Box::new(|| twin.update()))], 2, UPDATES);
-    let ours = in_turns(&mut [("update", Box::new(|| twin.update()))], ROUNDS, UPDATES);
-    let median = ours[0].median();
+    let update = || twin.update();
     writeln!(
         page,
         "## Learning\n\nOne update of MOSAC on one thread: {} samples of six devices, three forward passes for the \
-         targets, forward and backward passes of two critics and the actor, Adam, Polyak averages.\n\n\
-         | program | time | updates/s |\n|---|---|---|",
+         targets, forward and backward passes of two critics and the actor, Adam, Polyak averages.\n",
         twin::SAMPLES
     )?;
-    writeln!(page, "| `gleaner-train` | {} | {:.0} |", ours[0].text(), 1e6 / median)?;
-    match pytorch()? {
-        Some(wall_us) => writeln!(
-            page,
-            "| PyTorch, eager, directly after | {wall_us:.0} us (minimum) | {:.0} |\n\nPyTorch / ours, minima: {:.2}.",
-            1e6 / wall_us,
-            wall_us / ours[0].minimum()
-        )?,
-        None => writeln!(
-            page,
-            "\nPyTorch is not in the environment of the tests. `python3 host-trainer/scripts/compare_with_pytorch.py` \
-             compares with an installed one."
-        )?,
+    let peer = python::pytorch().and_then(|python| Peer::start(&python, "pytorch_bench.py", &[]));
+    let peer = peer.map(RefCell::new);
+    let mut contenders = vec![Contender::ours("`gleaner-train`", UPDATES, update)];
+    match &peer {
+        Ok(peer) => {
+            writeln!(page, "{}.\n", peer.borrow().about())?;
+            for name in ["eager", "compiled"] {
+                if peer.borrow_mut().round(name).is_ok() {
+                    let title = if name == "eager" { "PyTorch, eager" } else { "PyTorch, compiled" };
+                    contenders.push(Contender::peer(title, peer, name.into()));
+                }
+            }
+        }
+        Err(cause) => writeln!(page, "PyTorch was not measured: {cause:#}.\n")?,
+    }
+    in_turns(&mut contenders[..1], 2)?;
+    let times = in_turns(&mut contenders, ROUNDS)?;
+    writeln!(page, "| program | time | updates/s | program / `gleaner-train` |\n|---|---|---|---|")?;
+    for (contender, theirs) in contenders.iter().zip(&times) {
+        let ratio = times[0].ratio(theirs);
+        let updates = 1e6 / theirs.median();
+        writeln!(page, "| {} | {} | {updates:.0} | {ratio} |", contender.name, theirs.text())?;
     }
     Ok(())
-}
-
-/// The minimum of PyTorch's time, microseconds; `None` where it is not installed.
-fn pytorch() -> Result<Option<f64>> {
-    let script = repository().join("host-trainer/scripts/pytorch_update_bench.py");
-    let output = Command::new(python::interpreter()?).arg(script).arg("5").output()?;
-    let text = String::from_utf8_lossy(&output.stdout);
-    let mut words = text.split_whitespace().skip_while(|word| *word != "wall_ms").skip(1);
-    Ok(words.next().and_then(|number| number.parse::<f64>().ok()).map(|ms| ms * 1e3))
 }

@@ -22,9 +22,9 @@ pub(super) fn preamble() -> Result<String> {
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let load = load.split_whitespace().next().unwrap_or("unknown").to_owned();
     Ok(format!(
-        "# Benchmarks\n\nWritten by `cargo run --release -p gleaner-tests --bin benchmarks` at commit {} on {}. Machine: \
-         {model}, {processors} logical processors, load {load} at the start. Peers run in the same program run, in turns \
-         with ours; a ratio is peer / ours, the median of paired repetitions with its quartiles. Above 1, ours is \
+        "# Benchmarks\n\nWritten by `cargo build --release --workspace --bins && target/release/benchmarks` at commit {} on {}. Machine: \
+         {model}, {processors} logical processors, load {load} at the start. A load above 0.5 means that \
+         other programs ran meanwhile: then compare ratios, not times. Peers run in the same program run, in turns with ours; a ratio is peer / ours, the median of paired repetitions with its quartiles. Above 1, ours is \
          faster.\n",
         output("git", &["rev-parse", "--short", "HEAD"])?,
         output("date", &["-u", "+%Y-%m-%d"])?

@@ -1,12 +1,15 @@
 //! Paired timing.
 
+use super::peer::Peer;
+use anyhow::Result;
+use std::cell::RefCell;
 use std::time::Instant;
 
 /// Microseconds a call, one number for each repetition.
 pub(super) struct Times(Vec<f64>);
 
 impl Times {
-    /// Times that a peer measured, microseconds.
+    /// Measured times, microseconds.
     pub fn from_micros(micros: Vec<f64>) -> Times {
         Times(micros)
     }
@@ -31,8 +34,10 @@ impl Times {
         let (median, minimum) = (self.median(), self.minimum());
         if median < 1.0 {
             format!("{:.0} ns (minimum {:.0})", median * 1e3, minimum * 1e3)
-        } else {
+        } else if median < 1e4 {
             format!("{median:.1} us (minimum {minimum:.1})")
+        } else {
+            format!("{:.1} ms (minimum {:.1})", median / 1e3, minimum / 1e3)
         }
     }
 
@@ -51,20 +56,42 @@ fn quantile(numbers: &[f64], at: f64) -> f64 {
     sorted.get(index as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// Name, and one call.
-pub(super) type Contender<'a> = (&'static str, Box<dyn FnMut() + 'a>);
+/// One round of a contender: microseconds per call.
+type Round<'a> = Box<dyn FnMut() -> Result<f64> + 'a>;
 
-/// Times all contenders in turns: `repetitions` rounds of `calls` calls each.
-pub(super) fn in_turns(contenders: &mut [Contender<'_>], repetitions: usize, calls: usize) -> Vec<Times> {
-    let mut times: Vec<Times> = contenders.iter().map(|_| Times(Vec::new())).collect();
-    for _ in 0..repetitions {
-        for ((_, call), times) in contenders.iter_mut().zip(&mut times) {
+/// Something that is timed in turns with others.
+pub(super) struct Contender<'a> {
+    /// Its name in the table.
+    pub name: &'static str,
+    round: Round<'a>,
+}
+
+impl<'a> Contender<'a> {
+    /// Our own code: `calls` calls per round.
+    pub fn ours(name: &'static str, calls: usize, mut call: impl FnMut() + 'a) -> Contender<'a> {
+        let round = move || {
             let start = Instant::now();
             for _ in 0..calls {
                 call();
             }
-            times.0.push(start.elapsed().as_secs_f64() * 1e6 / calls as f64);
+            Ok(start.elapsed().as_secs_f64() * 1e6 / calls as f64)
+        };
+        Contender { name, round: Box::new(round) }
+    }
+
+    /// A contender of a peer.
+    pub fn peer(name: &'static str, peer: &'a RefCell<Peer>, contender: String) -> Contender<'a> {
+        Contender { name, round: Box::new(move || peer.borrow_mut().round(&contender)) }
+    }
+}
+
+/// Times all contenders in turns, in this many rounds.
+pub(super) fn in_turns(contenders: &mut [Contender<'_>], rounds: usize) -> Result<Vec<Times>> {
+    let mut times: Vec<Times> = contenders.iter().map(|_| Times(Vec::new())).collect();
+    for _ in 0..rounds {
+        for (contender, times) in contenders.iter_mut().zip(&mut times) {
+            times.0.push((contender.round)()?);
         }
     }
-    times
+    Ok(times)
 }

@@ -1,10 +1,12 @@
 //! MAVLink packets against pymavlink.
 
 use super::golden::golden_packet;
-use super::timing::{Contender, Times, in_turns};
+use super::peer::Peer;
+use super::timing::{Contender, in_turns};
 use crate::python;
 use anyhow::Result;
 use gleaner_link::{Address, FrameDecoder, Packet};
+use std::cell::RefCell;
 use std::fmt::Write;
 use std::fs;
 use std::hint::black_box;
@@ -42,6 +44,15 @@ fn decode(stream: &[u8]) -> usize {
     found
 }
 
+/// Reads the stream.
+pub(super) fn count(calls: u64) -> Result<()> {
+    let stream = stream()?;
+    for _ in 0..calls {
+        black_box(decode(black_box(&stream)));
+    }
+    Ok(())
+}
+
 /// Packets per second, in and out.
 pub(super) fn packets(page: &mut String) -> Result<()> {
     let stream = stream()?;
@@ -51,43 +62,42 @@ pub(super) fn packets(page: &mut String) -> Result<()> {
     fs::write(&file, &stream)?;
     let payload = [1; SETPOINT.2];
     let sender = Address { system: 42, component: 191 };
-    let mut contenders: [Contender<'_>; 2] = [
-        (
-            "read",
-            Box::new(|| {
-                let _ = black_box(decode(black_box(&stream)));
-            }),
-        ),
-        (
-            "write",
-            Box::new(|| {
-                for sequence in 0..PACKETS {
-                    let packet = Packet::from_payload(SETPOINT.0, SETPOINT.1, black_box(&payload));
-                    let _ = black_box(packet.map(|packet| packet.frame(sender, sequence as u8)));
-                }
-            }),
-        ),
+    let peer = Peer::start(&python::interpreter()?, "wire_bench.py", &[file.display().to_string()])?;
+    let peer = RefCell::new(peer);
+    let read = || {
+        let _ = black_box(decode(black_box(&stream)));
+    };
+    let write = || {
+        for sequence in 0..PACKETS {
+            let packet = Packet::from_payload(SETPOINT.0, SETPOINT.1, black_box(&payload));
+            let _ = black_box(packet.map(|packet| packet.frame(sender, sequence as u8)));
+        }
+    };
+    let mut contenders = [
+        Contender::ours("read", 1, read),
+        Contender::peer("read", &peer, "read".into()),
+        Contender::ours("write", 1, write),
+        Contender::peer("write", &peer, "write".into()),
     ];
-    let mut ours = in_turns(&mut contenders, ROUNDS, 1);
-    ours.iter_mut().for_each(|times| times.divide(PACKETS as f64));
-    let rounds = ROUNDS.to_string();
-    let peer = python::run("wire_bench.py", [file.as_os_str(), rounds.as_ref()])?;
+    let mut times = in_turns(&mut contenders, ROUNDS)?;
+    times.iter_mut().step_by(2).for_each(|ours| ours.divide(PACKETS as f64));
     writeln!(
         page,
         "## Wire\n\nMAVLink 2 packets, one thread. In: a stream of heartbeats, positions, battery states and RC channels \
-         in reads of {READ_BYTES} bytes. Out: position targets. pymavlink runs directly after; ratios are of repetitions \
-         in the same order.\n\n| direction | ours | million packets/s | pymavlink | pymavlink / ours |\n|---|---|---|---|---|"
+         in reads of {READ_BYTES} bytes. Out: position targets. The peer is {}.\n\n\
+         | direction | ours | million packets/s | pymavlink | pymavlink / ours |\n|---|---|---|---|---|",
+        peer.borrow().about()
     )?;
-    for (((name, _), ours), line) in contenders.iter().zip(&ours).zip(peer.lines()) {
-        let theirs: Vec<f64> = line.split_whitespace().filter_map(|number| number.parse().ok()).collect();
-        let theirs = Times::from_micros(theirs);
+    for (contenders, times) in contenders.chunks(2).zip(times.chunks(2)) {
+        let ([contender, _], [ours, theirs]) = (contenders, times) else { continue };
         writeln!(
             page,
-            "| {name} | {} | {:.2} | {} | {} |",
+            "| {} | {} | {:.2} | {} | {} |",
+            contender.name,
             ours.text(),
             1.0 / ours.median(),
             theirs.text(),
-            ours.ratio(&theirs)
+            ours.ratio(theirs)
         )?;
     }
     Ok(())

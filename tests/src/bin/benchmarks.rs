@@ -1,6 +1,7 @@
 //! Measures this project beside its peers and writes `docs/benchmarks.md`.
 //!
-//! `cargo run --release -p gleaner-tests --bin benchmarks [PART...]`; without a part, all of them.
+//! `cargo build --release --workspace --bins && target/release/benchmarks [PART...]`; without a part, all of them. Needs
+//! Python 3.11, and valgrind for the last part. `GLEANER_TORCH_PYTHON` names a Python that has PyTorch.
 
 use gleaner_tests::benchmarks;
 use std::process::ExitCode;

@@ -13,12 +13,12 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-const PROGRAM: &str = "qemu-system-arm";
+pub(super) const PROGRAM: &str = "qemu-system-arm";
 /// The first version whose STM32F405 stores what is written to the clock control. With older ones the program runs on
 /// the slow clock and its time is ten times too fast.
 const OLDEST: u32 = 10;
 /// A board with that chip, its UARTs in order: 1, 2 (autopilot), 3 (radio), 4 (log).
-const MACHINE: &str = "olimex-stm32-h405";
+pub(super) const MACHINE: &str = "olimex-stm32-h405";
 /// The stack's contents before the start.
 pub const STACK_PAINT: u8 = 0xC5;
 /// Longest time for an answer of the emulator.
@@ -198,7 +198,7 @@ fn connect(path: &Path, child: &mut Child) -> Result<BufReader<UnixStream>> {
     }
 }
 
-fn check_version() -> Result<()> {
+pub(super) fn check_version() -> Result<()> {
     let advice = format!(
         "install {PROGRAM} {OLDEST} or newer (Debian 12: from bookworm-backports), or type bash .ci/run"
     );

@@ -39,7 +39,7 @@ impl Image {
     /// # Errors
     /// It cannot be built, with what to do about it.
     pub fn build() -> Result<Image> {
-        Image::read(&toolchain::build()?)
+        Image::read(&toolchain::build(toolchain::SHIPPED)?)
     }
 
     /// The image in this file.

@@ -8,14 +8,17 @@ use std::process::Command;
 
 /// The board's processor: Cortex-M4 with its floating-point unit.
 const TARGET: &str = "thumbv7em-none-eabihf";
-const PROGRAM: &str = "gleaner-f405";
+/// The program that is shipped, and its features.
+pub(super) const SHIPPED: [&str; 2] = ["gleaner-f405", "f405"];
+/// The program that measures the cost of look-ahead.
+pub(super) const LOOKAHEAD_COST: [&str; 2] = ["lookahead-cost", "f405,lookahead-cost"];
 
-/// Builds the image of the shipped board; returns its path. Safe to call from several tests and processes at once: one
+/// Builds a program for the board; returns its path. Safe to call from several tests and processes at once: one
 /// builds, the others wait. It has a build folder of its own, so it never waits for the cargo that runs the tests.
 ///
 /// # Errors
 /// The core library for the board is missing (the message says what to type), or the image does not build.
-pub(super) fn build() -> Result<PathBuf> {
+pub(super) fn build([program, features]: [&str; 2]) -> Result<PathBuf> {
     let target_folder = repository().join("target/board");
     fs::create_dir_all(&target_folder)?;
     let lock = File::create(target_folder.join("build.lock"))?;
@@ -24,7 +27,7 @@ pub(super) fn build() -> Result<PathBuf> {
     let output = cargo
         .current_dir(repository())
         .args(["build", "--quiet", "--profile", "board", "--package", "gleaner-cortex-m"])
-        .args(["--bin", PROGRAM, "--features", "f405", "--target", TARGET, "--target-dir"])
+        .args(["--bin", program, "--features", features, "--target", TARGET, "--target-dir"])
         .arg(&target_folder)
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_TARGET_DIR")
@@ -34,7 +37,7 @@ pub(super) fn build() -> Result<PathBuf> {
     if !output.status.success() {
         bail!("the board image does not build:\n{}", String::from_utf8_lossy(&output.stderr));
     }
-    Ok(target_folder.join(TARGET).join("board").join(PROGRAM))
+    Ok(target_folder.join(TARGET).join("board").join(program))
     // Dropping the file releases the lock.
 }
 

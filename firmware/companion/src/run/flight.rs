@@ -13,7 +13,7 @@ use crate::radio::{Radio, describe};
 use crate::routing::Links;
 use gleaner_link::{MAX_FRAME_BYTES, Severity};
 use gleaner_pilot::{LookingAhead, Onboard, POLL_INTERVAL};
-use gleaner_policy::{Engine, Timed};
+use gleaner_policy::Engine;
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use std::time::{Duration, Instant};
 
@@ -35,7 +35,7 @@ const TRAFFIC_PERIOD: Duration = Duration::from_secs(10);
 
 /// The pilot with everything around it.
 pub struct Flight {
-    onboard: Onboard<LookingAhead<Timed<Engine>>>,
+    onboard: Onboard<LookingAhead<Engine>>,
     links: Links,
     radio: Option<Radio>,
     logs: Logs,
@@ -51,7 +51,7 @@ pub struct Flight {
 impl Flight {
     /// A pilot that has not been polled yet.
     pub fn new(
-        onboard: Onboard<LookingAhead<Timed<Engine>>>,
+        onboard: Onboard<LookingAhead<Engine>>,
         links: Links,
         radio: Option<Radio>,
         logs: Logs,
@@ -147,7 +147,7 @@ impl Flight {
         self.polled_at = now;
         self.service.feed(now);
         self.revoke();
-        let took = self.onboard.policy().network().take();
+        let took = self.onboard.policy().take_time();
         if let Some(took) = took {
             self.onboard.set_inference_time(took);
         }

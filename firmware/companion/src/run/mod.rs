@@ -18,7 +18,6 @@ use console::Console;
 use flight::Flight;
 use gleaner_link::Parameters;
 use gleaner_pilot::{Budget, LookingAhead, Onboard};
-use gleaner_policy::Timed;
 use gleaner_ports::{Endpoint, Peers, Port};
 use page::Page;
 use service::Service;
@@ -39,7 +38,7 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let (kept, parameters, lines) = Kept::open(&config, order.reset_parameters)?;
     let page = Page::open(&config, &mission, &parameters, &model)?;
     // The engine reproduced its golden pairs, or it would not have been loaded.
-    let policy = LookingAhead::new(Timed::new(engine, clock::now), Budget::LINUX);
+    let policy = LookingAhead::new(engine, Budget::LINUX).with_clock(clock::now);
     let onboard = Onboard::new(mission, parameters, config.settings, policy, Ok(()))
         .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
     let logs = Logs::open(&config)?;
@@ -52,6 +51,7 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let stop = gleaner_ports::end_requested().map_err(StartError::Signals)?;
     let console = Console::start(order.verbose);
     introduce(&config, &order.setup, &model, &links, radio.as_ref().map(Radio::port));
+    tracing::info!("{}", lookahead(onboard.parameters().looks_ahead()));
     for line in page.introduction(config.page_tokens.is_some()) {
         tracing::info!("{line}");
     }
@@ -112,6 +112,18 @@ fn introduce(config: &Config, setup: &Setup, model: &str, links: &Links, radio: 
     if config.state_dir.is_none() {
         let how = if setup.config.is_some() { "state_dir" } else { "--state" };
         tracing::info!("parameters set from the ground end with this run: {how} keeps them");
+    }
+}
+
+/// What decides, by `GLN_LOOKAHEAD`.
+fn lookahead(is_on: bool) -> String {
+    if is_on {
+        format!(
+            "look-ahead is on, up to {} tours per decision: GLN_LOOKAHEAD 0 switches it off",
+            Budget::LINUX.tours
+        )
+    } else {
+        "look-ahead is off, the network decides alone: GLN_LOOKAHEAD 1 switches it on".to_owned()
     }
 }
 

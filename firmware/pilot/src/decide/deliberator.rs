@@ -5,7 +5,7 @@ use gleaner_lookahead::{
     Budget, ChannelEstimate, ChannelModel, Expected, FitSettings, LookAhead, Source, View,
 };
 use gleaner_policy::{DeviceState, Inference, Policy, Preference, Tokens};
-use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Sight};
+use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Duration, Instant, Sight};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
@@ -105,6 +105,8 @@ pub struct LookingAhead<P> {
     budget: Budget,
     seed: u32,
     slot: u16,
+    clock: Option<fn() -> Instant>,
+    took: core::cell::Cell<Option<Duration>>,
 }
 
 impl<P> LookingAhead<P> {
@@ -112,7 +114,25 @@ impl<P> LookingAhead<P> {
     #[must_use]
     pub fn new(policy: P, budget: Budget) -> LookingAhead<P> {
         let lookahead = LookAhead::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
-        LookingAhead { policy, lookahead, devices: Vec::new(), budget, seed: 0, slot: 0 }
+        let (devices, took) = (Vec::new(), core::cell::Cell::new(None));
+        LookingAhead { policy, lookahead, devices, budget, seed: 0, slot: 0, clock: None, took }
+    }
+
+    /// Measures the time of each decision with this clock. The time is reported, never used.
+    #[must_use]
+    pub const fn with_clock(mut self, clock: fn() -> Instant) -> LookingAhead<P> {
+        self.clock = Some(clock);
+        self
+    }
+
+    /// How long network and look-ahead took for the last decision. `None` after it was taken, before the first decision, and
+    /// without a clock.
+    pub fn take_time(&self) -> Option<Duration> {
+        self.took.take()
+    }
+
+    fn now(&self) -> Option<Instant> {
+        self.clock.map(|clock| clock())
     }
 
     /// The network.
@@ -137,7 +157,10 @@ impl<P: Policy> Deliberator for LookingAhead<P> {
     const LOOKS_AHEAD: bool = true;
 
     fn infer(&mut self, tokens: &Tokens) -> Option<Inference> {
-        self.policy.infer(tokens).ok()
+        let begun = self.now();
+        let inference = self.policy.infer(tokens).ok();
+        self.took.set(begun.zip(self.now()).map(|(begun, now)| now.since(begun)));
+        inference
     }
 
     fn begin(&mut self, sight: Option<&dyn Sight>, devices: impl Iterator<Item = DeviceState>, seed: u32) {
@@ -159,7 +182,12 @@ impl<P: Policy> Deliberator for LookingAhead<P> {
         let &Place { cell, battery, preference, guard } = place;
         let view = View { cell, battery, preference, guard, devices: &self.devices };
         let budget = if is_on { self.budget } else { Budget::NONE };
+        let begun = self.now();
         let choice = self.lookahead.propose(&view, logits, mask, budget);
+        let planned = begun.zip(self.now()).map(|(begun, now)| now.since(begun));
+        if let (Some(network), Some(planned)) = (self.took.get(), planned) {
+            self.took.set(Some(network + planned));
+        }
         let slot = self.slot;
         self.slot = slot.saturating_add(1);
         let choice = choice?;

@@ -322,7 +322,8 @@ impl<P: Deliberator> Onboard<P> {
         self.policy
     }
 
-    /// How long the last inference took, measured by the program (a clock is an input); sent as `infer_us`.
+    /// How long the last decision took, network and look-ahead, measured by the program (a clock is an input); sent as
+    /// `infer_us`.
     pub fn set_inference_time(&mut self, took: Duration) {
         self.inference_time = Some(took);
     }

@@ -92,6 +92,8 @@ impl Missions {
         }
         let flight = Flight::new(site.world(), &drawn.realization, drawn.seed, drawn.preference)?
             .with_reports_missing(reports_missing, drawn.seed);
+        // Tables of all generated cities would fill the memory.
+        let flight = if index == 0 { flight.with_table(site.table()) } else { flight };
         let mut prospect = Prospect::new(self.rates[index].study(&drawn.realization), mission);
         let planner_value = prospect.value(&flight);
         Ok(RolloutFlight {

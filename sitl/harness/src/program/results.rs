@@ -1,6 +1,7 @@
 //! The results of a flight: figures as text and as JSON, and files.
 
 use super::ProgramError;
+use crate::journal::Slot;
 use crate::picture;
 use crate::{Figures, Simulation};
 use serde::Serialize;
@@ -106,10 +107,21 @@ pub(super) fn summary(
     vec![
         ("mission", format!("{scenario}, seed {seed}, {devices} devices, w_data {preference}")),
         ("policy", format!("{}, engine {}", policy.model, policy.engine)),
+        ("look-ahead", lookahead(simulation.journal().slots())),
         ("collected", format!("{:.1} % of the data", 100.0 * figures.collected)),
         ("energy", format!("{} of {budget} battery units", figures.energy.0)),
         ("decisions", format!("{} in {flight_s:.0} s of flight", figures.decisions)),
     ]
+}
+
+/// Whether the look-ahead was on, and in how many decisions it found a plan.
+fn lookahead(slots: &[Slot]) -> String {
+    let records = || slots.iter().filter_map(|slot| slot.record.lookahead);
+    if records().all(|record| record.budget == 0) {
+        return "off, the network decides alone".into();
+    }
+    let planned = records().filter(|record| record.tours > 0).count();
+    format!("on, {planned} of {} decisions planned", slots.len())
 }
 
 /// Prints the figures, the violations and where the picture is.

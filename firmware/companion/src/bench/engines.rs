@@ -1,11 +1,11 @@
-//! `gleaner bench`: the time of one inference in each engine, side by side.
+//! The time of one inference in each engine, side by side.
 
+use super::Times;
 use crate::args::Bench;
 use crate::error::StartError;
 use crate::load;
 use gleaner_policy::{Engine, EngineKind, Golden, Policy};
 use std::hint::black_box;
-use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 /// Inferences of one engine before the turn of the next. In turns of one, each engine would find the processor's caches full
@@ -17,7 +17,7 @@ const TURN: u32 = 20;
 ///
 /// # Errors
 /// An engine of this program refuses the model.
-pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
+pub(super) fn compare(order: &Bench) -> Result<(), StartError> {
     let kinds = EngineKind::ALL.into_iter().filter(|kind| kind.is_built());
     let mut engines =
         kinds.map(|kind| load::model(order.model.as_deref(), Some(kind))).collect::<Result<Vec<_>, _>>()?;
@@ -45,36 +45,24 @@ pub fn bench(order: &Bench) -> Result<ExitCode, StartError> {
                 // Not counted: it loads the weights into the caches.
                 let _ = engine.infer(&golden.tokens);
                 (turn..order.inferences.min(turn.saturating_add(TURN)))
-                    .for_each(|_| times.add(engine, golden));
+                    .for_each(|_| times.0.push(inference(engine, golden)));
             }
         }
         print!("{:7}", golden.tokens.devices.len());
-        let times: Vec<[f64; 2]> = times.iter_mut().map(Times::micros).collect();
+        let times: Vec<[f64; 2]> =
+            times.iter_mut().map(|times| [0.0, 0.5].map(|share| times.micros(share))).collect();
         times.iter().for_each(|[least, median]| print!("{least:18.1}  {median:8.1}"));
         match times[..] {
             [[_, first], [_, second]] => println!("    {:.2}", first / second),
             _ => println!(),
         }
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
-/// The time of each inference.
-#[derive(Default)]
-struct Times(Vec<Duration>);
-
-impl Times {
-    fn add(&mut self, engine: &mut Engine, golden: &Golden) {
-        let start = Instant::now();
-        // Cannot fail: the self-test ran the same inference.
-        let _ = black_box(engine.infer(black_box(&golden.tokens)));
-        self.0.push(start.elapsed());
-    }
-
-    /// Minimum and median.
-    fn micros(&mut self) -> [f64; 2] {
-        self.0.sort_unstable();
-        let at = |index: usize| self.0.get(index).map_or(f64::NAN, |took| took.as_secs_f64() * 1e6);
-        [at(0), at(self.0.len() / 2)]
-    }
+fn inference(engine: &mut Engine, golden: &Golden) -> Duration {
+    let start = Instant::now();
+    // Cannot fail: the self-test ran the same inference.
+    let _ = black_box(engine.infer(black_box(&golden.tokens)));
+    start.elapsed()
 }

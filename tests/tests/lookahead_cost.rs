@@ -1,0 +1,28 @@
+//! What look-ahead would cost on the board. The figures are in `docs/results.md`, "Look-ahead on the board".
+//!
+//! `cargo test --release --workspace --test lookahead_cost -- --nocapture`
+
+use gleaner_tests::board::LookAheadCost;
+
+const CLOCK_MHZ: f64 = 168.0;
+/// As for the inference, see `budget.rs`.
+const CYCLES_PER_INSTRUCTION: f64 = 2.4;
+/// The documented figures, with a tolerance of some percent.
+const BYTES_MAX: u64 = 7_900;
+const BEGIN_MAX: u64 = 1_600_000;
+const DECISION: std::ops::RangeInclusive<u64> = 12_000_000..=15_000_000;
+
+#[test]
+fn planner_costs_on_the_board_what_results_say() {
+    let LookAheadCost { bytes, begin, decisions } =
+        LookAheadCost::measure().unwrap_or_else(|cause| panic!("{cause:#}"));
+    let ms = |instructions: u64| instructions as f64 * CYCLES_PER_INSTRUCTION / CLOCK_MHZ / 1e3;
+    println!("planner for 12 devices: {bytes} bytes of RAM");
+    println!("begin of a mission: {begin} instructions, {:.0} ms", ms(begin));
+    for &decision in &decisions {
+        println!("decision with 100 tours: {decision} instructions, {:.0} ms", ms(decision));
+    }
+    assert!(bytes <= BYTES_MAX, "{bytes} bytes");
+    assert!(begin <= BEGIN_MAX, "{begin} instructions");
+    assert!(decisions.iter().all(|instructions| DECISION.contains(instructions)), "{decisions:?}");
+}
