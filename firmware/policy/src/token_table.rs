@@ -1,7 +1,7 @@
 //! Tokens from tables: what each device can send to each cell of a city is computed once.
 
 use crate::outlook::Outlook;
-use crate::vantage::vantage;
+use crate::vantage::{self, is_fast, nearest, vantage};
 use crate::yields::{self, REACH, WINDOW};
 use crate::{DeviceState, LOCAL_MAP_CELLS, Situation, Slots, Tokens};
 use gleaner_units::{Cell, Grid, Metres, Sight};
@@ -9,6 +9,9 @@ use heapless::Vec as Few;
 
 /// Columns of a window in memory: one more than needed, for whole vector registers.
 const COLUMNS: usize = WINDOW + 1;
+
+/// Rows, and columns, of the cells in which a vantage is searched.
+const FAST_ROWS: usize = 2 * vantage::REACH as usize + 1;
 
 /// Builds the same tokens as [`Tokens::build`], bit for bit, for many observations of one city.
 ///
@@ -34,6 +37,8 @@ struct Coverage {
     stride: usize,
     /// Vantages by grid index of the aircraft.
     vantages: Vec<Option<[f32; 2]>>,
+    /// Cells around the device with a fast link: one bit a cell, row by row from the south-west.
+    fast: [u16; FAST_ROWS],
 }
 
 impl Coverage {
@@ -52,7 +57,22 @@ impl Coverage {
                 *place = units as u16;
             }
         }
-        Coverage { stay_units, stride, vantages: vec![None; grid.len()] }
+        let mut fast = [0; FAST_ROWS];
+        for (row, north) in fast.iter_mut().zip(-vantage::REACH..) {
+            for (bit, east) in (0..FAST_ROWS).zip(-vantage::REACH..) {
+                let cell = Cell::new(device.x.saturating_add(east), device.y.saturating_add(north));
+                let cells2 = i32::from(east) * i32::from(east) + i32::from(north) * i32::from(north);
+                *row |= u16::from(is_fast(sight, device, cell, cells2)) << bit;
+            }
+        }
+        Coverage { stay_units, stride, vantages: vec![None; grid.len()], fast }
+    }
+
+    /// Whether `cell` has a fast link to `device`.
+    fn is_fast(&self, device: Cell, cell: Cell) -> bool {
+        let place = |cell: i16, device: i16| usize::try_from(cell - device + vantage::REACH).ok();
+        let row = place(cell.y, device.y).and_then(|row| self.fast.get(row));
+        row.zip(place(cell.x, device.x)).is_some_and(|(row, bit)| row >> bit & 1 == 1)
     }
 
     /// Adds the yield, limited to `remaining`, to the window around `center`, which is inside the grid.
@@ -61,7 +81,8 @@ impl Coverage {
         for (line, stays) in window.iter_mut().zip(lines) {
             let stays = stays.get(center.x as usize..).and_then(|stays| stays.first_chunk::<COLUMNS>());
             for (units, stay) in line.iter_mut().zip(stays.into_iter().flatten()) {
-                *units = units.saturating_add((*stay).min(remaining));
+                // The lower of `stay` and `remaining`, in operations that SSE2 has for 16 bits.
+                *units = units.saturating_add(stay.wrapping_sub(stay.saturating_sub(remaining)));
             }
         }
     }
@@ -136,11 +157,17 @@ impl Outlook for Tabled<'_> {
 
     fn vantage(&mut self, device: Cell) -> [f32; 2] {
         let (sight, center, aircraft) = (self.sight, self.center, self.aircraft);
-        let coverage = coverage(self.table, self.grid, sight, device);
-        match coverage.and_then(|coverage| coverage.vantages.get_mut(aircraft)) {
-            Some(known) => *known.get_or_insert_with(|| vantage(sight, device, center)),
-            None => vantage(sight, device, center),
+        let Some(coverage) = coverage(self.table, self.grid, sight, device) else {
+            return vantage(sight, device, center);
+        };
+        if let Some(&Some(known)) = coverage.vantages.get(aircraft) {
+            return known;
         }
+        let offset = nearest(device, center, |cell, _| coverage.is_fast(device, cell));
+        if let Some(place) = coverage.vantages.get_mut(aircraft) {
+            *place = Some(offset);
+        }
+        offset
     }
 
     fn patches(&self, terminal: Cell) -> Few<f32, LOCAL_MAP_CELLS> {

@@ -10,7 +10,7 @@ use gleaner_units::{Cell, Sight};
 /// Lowest data rate of a vantage, data units per slot.
 const FAST_UNITS: f32 = 400.0;
 /// Search radius, cells. Farther away the rate is lower even at an altitude of 20 m and with cells of 20 m.
-const REACH: i16 = 7;
+pub(crate) const REACH: i16 = 7;
 
 /// East and north offset, in cells, from the aircraft at `from` to the vantage of the device at `device`.
 ///
@@ -20,9 +20,23 @@ const REACH: i16 = 7;
 /// # Cost
 /// At most one line-of-sight test for each of the 149 cells around the device.
 pub(crate) fn vantage(sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
+    nearest(device, from, |cell, cells2| is_fast(sight, device, cell, cells2))
+}
+
+/// Whether `cell` has line of sight and a fast link to `device`, which is the root of `cells2` cells away.
+#[inline(always)]
+pub(crate) fn is_fast(sight: &dyn Sight, device: Cell, cell: Cell, cells2: i32) -> bool {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;
     let height_m2 = sight.altitude().0 * sight.altitude().0;
+    units_per_slot(cells2 as f32 * cell_m2 + height_m2) >= FAST_UNITS
+        && grid.contains(cell)
+        && sight.sees(device, cell)
+}
+
+/// As [`vantage`], where `is_fast` says which cells within [`REACH`] have a fast link.
+#[inline(always)]
+pub(crate) fn nearest(device: Cell, from: Cell, is_fast: impl Fn(Cell, i32) -> bool) -> [f32; 2] {
     let mut best = (i32::MAX, i32::MAX);
     let (mut sum, mut count) = ([0_i32; 2], 0_i32);
     for north in -REACH..=REACH {
@@ -31,11 +45,7 @@ pub(crate) fn vantage(sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
             let cell = Cell::new(device.x.saturating_add(east), device.y.saturating_add(north));
             let offset = [i32::from(cell.x) - i32::from(from.x), i32::from(cell.y) - i32::from(from.y)];
             let rank = (offset.iter().map(|cells| cells.abs()).sum(), cells2);
-            if rank > best
-                || units_per_slot(cells2 as f32 * cell_m2 + height_m2) < FAST_UNITS
-                || !grid.contains(cell)
-                || !sight.sees(device, cell)
-            {
+            if rank > best || !is_fast(cell, cells2) {
                 continue;
             }
             if rank < best {
