@@ -13,6 +13,10 @@ pub struct LookAheadCost {
     pub begin: u64,
     /// Instructions of each decision with 100 tours.
     pub decisions: Vec<u64>,
+    /// Instructions of each observation of twelve devices, which is built without look-ahead too.
+    pub tokens: Vec<u64>,
+    /// Instructions of each mask of the guard.
+    pub masks: Vec<u64>,
 }
 
 impl LookAheadCost {
@@ -44,6 +48,8 @@ impl LookAheadCost {
                 "bytes" => cost.bytes = value,
                 "begin" => cost.begin = instructions,
                 "decision" => cost.decisions.push(instructions),
+                "tokens" => cost.tokens.push(instructions),
+                "mask" => cost.masks.push(instructions),
                 _ => {}
             }
         }

@@ -1,11 +1,12 @@
-//! What look-ahead would cost on the board: a program for the emulator, which prints ticks of the system timer by
-//! semihosting. `tests/tests/lookahead_cost.rs` runs it. It is not flashed.
+//! What the parts of a decision cost on the board, and what look-ahead would: a program for the emulator, which prints
+//! ticks of the system timer by semihosting. `tests/tests/lookahead_cost.rs` runs it. It is not flashed.
 //!
 //! Twelve devices, 40 x 30 cells, 100 tours per decision. The first line calibrates: a million instructions.
 #![no_std]
 #![no_main]
 
 use core::fmt::Write;
+use core::hint::black_box;
 use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::entry;
@@ -13,8 +14,10 @@ use gleaner_cortex_m::Cause;
 use gleaner_cortex_m::bare::end;
 use gleaner_guard::Guard;
 use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, View};
-use gleaner_policy::{DeviceState, Preference};
-use gleaner_units::{Action, BatteryUnits, Cell, CellSet, Db, Grid, HeightMap, Metres, Rays, Sight};
+use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
+use gleaner_units::{
+    Action, ActionMask, BatteryUnits, Cell, CellSet, Db, Grid, HeightMap, Metres, Rays, Sight,
+};
 use heapless::String;
 use static_cell::StaticCell;
 // The vector table.
@@ -82,7 +85,22 @@ fn measure() -> Option<()> {
             guard,
             devices: &devices,
         };
-        let mask = guard.mask(cell, view.battery);
+        let situation = Situation {
+            cell,
+            battery: view.battery,
+            spare: view.battery,
+            terminal: Cell::new(36, 20),
+            preference: view.preference,
+            sight: &rays,
+        };
+        print(
+            "tokens",
+            ticks(|| {
+                let _ = black_box(Tokens::build(&situation, devices.iter().copied()));
+            }),
+        );
+        let mut mask = ActionMask::default();
+        print("mask", ticks(|| mask = black_box(guard.mask(cell, view.battery))));
         let mut action = Action::Hover;
         print(
             "decision",
