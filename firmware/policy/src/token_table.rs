@@ -80,7 +80,8 @@ impl Coverage {
         let lines = self.stay_units.chunks_exact(self.stride).skip(center.y as usize);
         for (line, stays) in window.iter_mut().zip(lines) {
             let stays = stays.get(center.x as usize..).and_then(|stays| stays.first_chunk::<COLUMNS>());
-            for (units, stay) in line.iter_mut().zip(stays.into_iter().flatten()) {
+            let Some(stays) = stays else { continue };
+            for (units, stay) in line.iter_mut().zip(stays) {
                 // The lower of `stay` and `remaining`, in operations that SSE2 has for 16 bits.
                 *units = units.saturating_add(stay.wrapping_sub(stay.saturating_sub(remaining)));
             }
