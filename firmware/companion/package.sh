@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds what a user installs, into target/package:
 #   gleaner_VERSION_ARCH.deb     for each ARCH that is named: amd64, arm64
-#   gleaner-ARCH-static          the program as one static binary, where the musl target is installed
+#   gleaner-ARCH-static          the program as one static binary without the engine tract, where the musl target is
+#                                installed
 # usage: firmware/companion/package.sh [amd64|arm64]...      without a name: this machine's
 #        NO_BUILD=1 packages the program that is built already
 #
@@ -33,6 +34,14 @@ has_target() {
 
 build() {
     [[ -n ${NO_BUILD:-} ]] || cargo build --release --package gleaner-companion --bin gleaner "$@"
+}
+
+# Removes symbols and line tables.
+strip_for() {
+    local tool=strip
+    [[ $1 == "$(dpkg --print-architecture)" ]] || tool=$(machine "$1")-linux-gnu-strip
+    command -v "$tool" >/dev/null || fail "$tool is missing: apt install binutils"
+    "$tool" "$2"
 }
 
 # Releases of cargo-deb before 2.11 cannot read a workspace with resolver 3. So the package is made from a manifest of its
@@ -73,14 +82,17 @@ for architecture; do
             fail "no linker for $target: apt install gcc-aarch64-linux-gnu"
         build --target "$target"
         stage "target/$target/release/gleaner" "target/$target/release"
-        # The strip of this machine does not know the other's binaries.
+        # cargo-deb would call the strip of this machine, which does not know the other's binaries.
+        strip_for "$architecture" "$out/stage/firmware/companion/target/$target/release/gleaner"
         (cd "$out/stage/firmware/companion" && cargo deb --no-build --no-strip --target "$target" --output "$out")
     fi
     static=$rust-unknown-linux-musl
     if has_target "$static"; then
-        build --target "$static"
-        [[ ! -f target/$static/release/gleaner ]] ||
+        build --target "$static" --no-default-features
+        if [[ -f target/$static/release/gleaner ]]; then
             cp "target/$static/release/gleaner" "$out/gleaner-$architecture-static"
+            strip_for "$architecture" "$out/gleaner-$architecture-static"
+        fi
     else
         echo "no static binary for $architecture: rustup target add $static" >&2
     fi

@@ -1,6 +1,7 @@
 //! Why the program cannot run: what, where, what to do. Every error ends it with exit code 2.
 
 use crate::config::ConfigError;
+#[cfg(feature = "tract")]
 use crate::contract::SealError;
 use crate::keep::StateError;
 use crate::load::LoadError;
@@ -44,6 +45,7 @@ pub enum StartError {
         source: ConvertError,
     },
     /// The model cannot be sealed.
+    #[cfg(feature = "tract")]
     #[error("model {}: {source}", .path.display())]
     Seal {
         /// Where.
@@ -51,6 +53,10 @@ pub enum StartError {
         /// Why.
         source: SealError,
     },
+    /// This program cannot run the graph of a model of one's own.
+    #[cfg(not(feature = "tract"))]
+    #[error("sealing needs the engine tract, which this program has not: use the program of the Debian package")]
+    NoTract,
     /// A result cannot be written.
     #[error("{}: cannot be written: {source}: give another path with --out, or correct its permissions", .path.display())]
     Write {

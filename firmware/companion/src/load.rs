@@ -67,6 +67,7 @@ pub fn model(path: Option<&Path>, engine: Option<EngineKind>) -> Result<Engine, 
     let load = |kind| Engine::load_checked(&bytes, kind);
     let loaded = match engine {
         Some(kind) => load(kind),
+        None if !EngineKind::Tract.is_built() => load(EngineKind::Native),
         None => load(EngineKind::Native).or_else(|_| load(EngineKind::Tract)),
     };
     loaded.map_err(|source| LoadError::Model { path: model_name(path), source })

@@ -11,6 +11,7 @@ mod bench;
 mod check;
 mod clock;
 mod config;
+#[cfg(feature = "tract")]
 mod contract;
 mod convert;
 mod error;

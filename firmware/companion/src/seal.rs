@@ -1,17 +1,21 @@
 //! `gleaner seal`: makes an ONNX model of one's own flyable.
 
 use crate::args::Sealing;
-use crate::contract::{SealError, sealed};
 use crate::error::StartError;
-use crate::load;
-use gleaner_policy::onnx::ModelCard;
-use std::fs;
 use std::process::ExitCode;
+#[cfg(feature = "tract")]
+use {
+    crate::contract::{SealError, sealed},
+    crate::load,
+    gleaner_policy::onnx::ModelCard,
+    std::fs,
+};
 
 /// Writes the sealed file.
 ///
 /// # Errors
 /// The model cannot be read, does not keep the contract, or the file cannot be written.
+#[cfg(feature = "tract")]
 pub fn run(order: &Sealing) -> Result<ExitCode, StartError> {
     let path = &order.model;
     let bytes = load::model_bytes(Some(path))?;
@@ -36,4 +40,13 @@ pub fn run(order: &Sealing) -> Result<ExitCode, StartError> {
         println!("warning: the model gives the same answer to every observation");
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses: the graph of a model of one's own runs in tract only.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "tract"))]
+pub fn run(_: &Sealing) -> Result<ExitCode, StartError> {
+    Err(StartError::NoTract)
 }
