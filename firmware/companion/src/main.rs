@@ -19,6 +19,7 @@ mod keep;
 mod load;
 mod logs;
 mod mission;
+mod models;
 mod params;
 mod ports;
 mod radio;

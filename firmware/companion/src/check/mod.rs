@@ -8,6 +8,7 @@ use crate::config::{self, Config};
 use crate::error::StartError;
 use crate::load;
 use crate::logs::DecisionLog;
+use crate::models::Installed;
 use crate::radio::Radio;
 use crate::run::open;
 use gleaner_policy::{Engine, Policy};
@@ -37,7 +38,7 @@ pub fn check(setup: &Setup, wait_s: u64) -> Result<ExitCode, StartError> {
         mission::check(&mut findings, &loaded, &config.parameters);
         devices.extend(loaded.mission.devices.iter().map(|device| device.id));
     }
-    check_model(&mut findings, &config);
+    check_models(&mut findings, &config);
     let heard = check_ports(&mut findings, &config, &devices, wait_s);
     if let Some(folder) = &config.log_dir {
         let (news, _) = channel();
@@ -111,19 +112,27 @@ impl Findings {
     }
 }
 
-fn check_model(findings: &mut Findings, config: &Config) {
-    let path = config.model.as_deref();
-    let model = findings.of("model", load::model(path, config.engine), |model| {
+/// The configured model with its engine, and the other installed ones with the numbers that `GLN_MODEL` gives them.
+fn check_models(findings: &mut Findings, config: &Config) {
+    let installed = Installed::new(config);
+    if let Some(model) = check_model(findings, &installed, 0) {
+        check_engine(findings, model);
+    }
+    for number in 1..=installed.last() {
+        check_model(findings, &installed, number);
+    }
+}
+
+fn check_model(findings: &mut Findings, installed: &Installed, number: usize) -> Option<Engine> {
+    let what = if number == 0 { "model".to_owned() } else { format!("model {number}") };
+    findings.of(&what, installed.load(number), |model| {
         let trained = model
             .card()
             .map_or_else(String::new, |card| format!(", {} steps in {}", card.steps, card.scenario));
         let identity: String = model.sha256().chars().take(12).collect();
-        let file = load::model_name(path);
+        let file = load::model_name(installed.file(number).flatten());
         format!("{} {}{trained}, sha256 {identity} ({})", model.name(), model.version(), file.display())
-    });
-    if let Some(model) = model {
-        check_engine(findings, model);
-    }
+    })
 }
 
 /// The model was verified when it was loaded; here its speed is measured.

@@ -1,6 +1,6 @@
 //! The configuration file and its faults.
 
-use super::{ConfigError, RadioFormat, SigningConfig};
+use super::{ConfigError, MOST_MODELS, RadioFormat, SigningConfig};
 use crate::logs::Limits;
 use gleaner_dashboard::{Token, http_address};
 use gleaner_link::{Operators, Parameters};
@@ -20,6 +20,7 @@ use toml::Spanned;
 #[serde(deny_unknown_fields)]
 pub(super) struct File {
     pub model: Option<PathBuf>,
+    models: Option<Spanned<Vec<PathBuf>>>,
     pub engine: Option<Spanned<String>>,
     pub mission: Option<PathBuf>,
     pub autopilot: Option<Spanned<String>>,
@@ -125,6 +126,15 @@ impl Source<'_> {
             settings.operators = self.operators(operators)?;
         }
         Ok(settings)
+    }
+
+    pub fn models<'f>(&self, file: &'f File) -> Result<&'f [PathBuf], ConfigError> {
+        let Some(models) = &file.models else { return Ok(&[]) };
+        if models.get_ref().len() > MOST_MODELS {
+            let what = format!("models: more than {MOST_MODELS} entries: leave some out");
+            return Err(self.fault(models.span().start, what));
+        }
+        Ok(models.get_ref())
     }
 
     fn operators(&self, entries: &[Spanned<String>]) -> Result<Operators, ConfigError> {

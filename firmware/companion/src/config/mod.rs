@@ -2,6 +2,7 @@
 //!
 //! ```toml
 //! model = "policy.onnx"                       # optional; paths are relative to this file
+//! models = ["mine.onnx"]                      # optional: more models, chosen by GLN_MODEL 1, 2, ...
 //! engine = "native"                           # optional: native or tract
 //! mission = "mission.toml"
 //! autopilot = "serial:/dev/ttyAMA0:921600"
@@ -60,10 +61,15 @@ pub enum RadioFormat {
     SemtechUdp(Calibration),
 }
 
+/// Most entries of `models`: the range of `GLN_MODEL`.
+const MOST_MODELS: usize = 16;
+
 /// Everything that a run needs.
 pub struct Config {
     /// The model file; without one the built-in model.
     pub model: Option<PathBuf>,
+    /// Further models, chosen by `GLN_MODEL` from 1 on.
+    pub models: Vec<PathBuf>,
     /// What runs the model; `None` leaves the choice to the model.
     pub engine: Option<EngineKind>,
     /// The mission file.
@@ -217,6 +223,7 @@ fn merge(
         http: setup.http.or(source.http(&file.page)?),
         page_tokens: source.page_tokens(&file.page)?,
         model: path(&setup.model, &file.model),
+        models: source.models(&file)?.iter().map(|model| folder.join(model)).collect(),
         engine: setup.engine.or(engine),
         mission: path(&setup.mission, &file.mission).ok_or(missing("mission", "mission.toml"))?,
         autopilot: setup

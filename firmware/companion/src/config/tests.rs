@@ -75,7 +75,7 @@ fn faults_name_file_line_and_key_and_say_what_to_do() {
         assert_eq!(fault(&TEXT.replace(from, to)), format!("{file}{expected}"));
     }
     for (from, to, start) in [
-        ("model =", "modle =", "line 1: unknown field `modle`, expected one of `model`, `engine`, `mission`"),
+        ("model =", "modle =", "line 1: unknown field `modle`, expected one of `model`, `models`, `engine`"),
         ("udpin:127.0.0.1:14540", "udpin:14540", "line 3: autopilot: 'udpin:14540' is not an endpoint: "),
         (
             "component_id",

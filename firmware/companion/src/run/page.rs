@@ -32,7 +32,8 @@ impl Page {
         }
         let altitude = parameters.altitude();
         let name = config.mission.file_stem().unwrap_or_default().to_string_lossy();
-        let title = format!("{name}, model {model}");
+        let when = if config.models.is_empty() { "" } else { " at the start" };
+        let title = format!("{name}, model {model}{when}");
         let scene = Scene { controls: true, ..scene(mission, altitude.0 as u16, title) };
         let access = Access::of(address, config.page_tokens.clone()).map_err(ServerError::from)?;
         let server = Server::start(address, access, scene)?;

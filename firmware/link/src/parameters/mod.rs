@@ -187,6 +187,12 @@ impl Parameters {
         self.value(ParameterId::Lookahead) != 0.0
     }
 
+    /// Number of the installed model that is chosen; -1 for the one before.
+    #[must_use]
+    pub fn model(&self) -> i8 {
+        self.value(ParameterId::Model) as i8
+    }
+
     /// RC channel mapped to the preference, counted from 1.
     #[must_use]
     pub fn data_weight_channel(&self) -> Option<u8> {
@@ -218,7 +224,7 @@ mod tests {
                 );
             }
         }
-        assert_eq!(ParameterId::from_index(10), None);
+        assert_eq!(ParameterId::from_index(11), None);
     }
 
     #[test]
@@ -243,7 +249,7 @@ mod tests {
         #![proptest_config(crate::seeded())]
 
         #[test]
-        fn values_stay_in_their_ranges(asks in proptest::collection::vec((0u16..10, any::<f32>()), 0..40)) {
+        fn values_stay_in_their_ranges(asks in proptest::collection::vec((0u16..11, any::<f32>()), 0..40)) {
             let mut parameters = Parameters::default();
             for (index, value) in asks {
                 let id = ParameterId::from_index(index).unwrap();

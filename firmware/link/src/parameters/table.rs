@@ -24,6 +24,8 @@ pub enum ParameterId {
     DataWeightChannel = 8,
     /// `GLN_LOOKAHEAD`.
     Lookahead = 9,
+    /// `GLN_MODEL`.
+    Model = 10,
 }
 
 /// One row of the table.
@@ -59,7 +61,7 @@ const fn row(
 }
 
 /// Number of parameters.
-pub(super) const COUNT: usize = 10;
+pub(super) const COUNT: usize = 11;
 
 /// All parameters, by index: `[min, max, default]`.
 #[rustfmt::skip]
@@ -84,6 +86,8 @@ pub const PARAMETERS: [ParameterSpec; COUNT] = [
         "RC channel mapped to the preference; 0 none."),
     row(ParameterId::Lookahead, "GLN_LOOKAHEAD", [0.0, 1.0, 0.0], true, "",
         "0 the network alone decides, 1 it looks ahead in the on-board model."),
+    row(ParameterId::Model, "GLN_MODEL", [-1.0, 16.0, 0.0], true, "",
+        "Installed model that decides; 0 the configured one, -1 the one before. Not in flight."),
 ];
 
 impl ParameterId {
@@ -101,6 +105,7 @@ impl ParameterId {
             ParameterId::SnrAge => PARAMETERS[7],
             ParameterId::DataWeightChannel => PARAMETERS[8],
             ParameterId::Lookahead => PARAMETERS[9],
+            ParameterId::Model => PARAMETERS[10],
         }
     }
 

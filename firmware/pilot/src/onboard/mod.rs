@@ -1,6 +1,7 @@
 //! Bytes in, bytes out: link endpoint, radio decoder, device table and [`Machine`] in one.
 
 mod heard;
+mod program;
 mod rc;
 mod recall;
 mod receiving;
@@ -71,6 +72,7 @@ pub struct Onboard<P> {
     tunnel_refused: u32,
     inference_time: Option<Duration>,
     engage_inhibited: bool,
+    offers_models: bool,
     decision_taken: bool,
 }
 
@@ -112,6 +114,7 @@ impl<P: Deliberator> Onboard<P> {
             tunnel_refused: 0,
             inference_time: None,
             engage_inhibited: false,
+            offers_models: false,
             decision_taken: true,
         }
     }

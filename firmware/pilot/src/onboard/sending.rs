@@ -26,6 +26,7 @@ impl<P: Deliberator> Onboard<P> {
         self.recall.heard(self.link.autopilot().heartbeat_at());
         self.show_enable();
         self.show_lookahead();
+        self.show_only_model();
         self.send_decision(out);
         self.send_telemetry(now, out);
     }

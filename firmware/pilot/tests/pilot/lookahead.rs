@@ -138,6 +138,24 @@ fn the_channel_offset_is_in_record_and_telemetry() {
 }
 
 #[test]
+fn a_program_with_one_model_keeps_the_choice_at_0() {
+    let mut bench = Bench::new(Ok(()));
+    bench.run(8);
+    let set = mavlink::dialects::ardupilotmega::PARAM_SET_DATA {
+        param_value: 1.0,
+        target_system: bench.onboard.link().address().system,
+        target_component: 191,
+        param_id: "GLN_MODEL".into(),
+        param_type: mavlink::dialects::ardupilotmega::MavParamType::MAV_PARAM_TYPE_REAL32,
+    };
+    bench.hear(crate::bench::STATION, &set);
+    bench.run(8);
+    assert_eq!(bench.onboard.parameters().model(), 0);
+    let texts = bench.texts();
+    assert!(texts.iter().any(|text| text == "gleaner: no other model is installed"), "{texts:?}");
+}
+
+#[test]
 fn a_program_without_lookahead_keeps_the_parameter_at_0() {
     let mut bench = Bench::new(Ok(()));
     bench.run(8);
