@@ -8,16 +8,16 @@ use crate::config::Config;
 use crate::load::{self, LoadError};
 use gleaner_link::{ParameterId, Parameters, Severity};
 use gleaner_pilot::{Budget, LookingAhead, Onboard};
-use gleaner_policy::{Engine, EngineKind, Timed};
+use gleaner_policy::{Engine, EngineKind};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 /// The policy of this program.
-pub type FlightPolicy = LookingAhead<Timed<Engine>>;
+pub type FlightPolicy = LookingAhead<Engine>;
 
 /// The policy that a model becomes.
 pub fn policy(engine: Engine) -> FlightPolicy {
-    LookingAhead::new(Timed::new(engine, clock::now), Budget::LINUX)
+    LookingAhead::new(engine, Budget::LINUX).with_clock(clock::now)
 }
 
 /// The files of the models, by number. `None` is the built-in model.

@@ -69,7 +69,7 @@ mod wire;
 
 pub use address::Address;
 pub use autopilot_command::AutopilotCommand;
-pub use component::Component;
+pub use component::{Component, FILE_DATA_BYTES};
 pub use event::{Event, Failsafe, OperatorRequest, Outcome, ReportBytes};
 pub use message::{
     BatteryStatus, ChargeState, Command, CommandAck, CommandForm, CommandResult, FollowedTarget,

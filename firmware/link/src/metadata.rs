@@ -1,8 +1,8 @@
 //! Component metadata: JSON files from which a ground station learns names, units and ranges of the parameters
 //! (MAVLink guide, "Component Metadata Protocol"; schemas `general.schema.json` and `parameter.schema.json`).
 //!
-//! The program serves both files, for example by HTTP, and gives the URI of the general one to
-//! [`crate::Component::set_metadata`]. MAVLink FTP is not offered.
+//! The program serves both files, by MAVLink FTP or by HTTP, and gives the URI of the general one to
+//! [`crate::Component::set_metadata`]. Its answers by MAVLink FTP leave through [`crate::Component::reply_file`].
 
 use crate::parameters::{PARAMETERS, ParameterId, ParameterSpec};
 use core::fmt::{self, Write};

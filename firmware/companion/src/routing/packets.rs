@@ -33,6 +33,15 @@ pub struct Packet {
     pub verified: bool,
 }
 
+impl Packet {
+    /// The payload as it came: MAVLink 2 leaves out trailing zeros.
+    pub fn payload(&self) -> &[u8] {
+        let length = self.bytes.get(1).copied().map_or(0, usize::from);
+        let header = if self.bytes.first() == Some(&MAGIC_V2) { HEADER_V2 } else { HEADER_V1 };
+        self.bytes.get(header..header + length).unwrap_or(&[])
+    }
+}
+
 /// Counters of one port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PacketStats {

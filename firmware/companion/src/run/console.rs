@@ -9,7 +9,6 @@ use tracing_subscriber::EnvFilter;
 
 const HEARTBEAT: u32 = 0;
 const STATUSTEXT: u32 = 253;
-const HEADER: usize = 10;
 
 /// The console. Messages leave on a thread of their own until it is dropped: a stopped terminal, a closed pipe or a full
 /// disk must not stop the decision loop.
@@ -91,23 +90,16 @@ impl Console {
     }
 }
 
-fn payload(packet: &Packet) -> &[u8] {
-    let length = packet.bytes.get(1).copied().map_or(0, usize::from);
-    let header = if packet.bytes.first() == Some(&0xFD) { HEADER } else { 6 };
-    packet.bytes.get(header..header + length).unwrap_or(&[])
-}
-
 /// Severity and text. MAVLink 2 leaves out trailing zeros.
 fn status_text(packet: &Packet) -> Option<(u8, String)> {
-    let payload = payload(packet);
-    let (&severity, text) = payload.split_first().filter(|_| packet.message_id == STATUSTEXT)?;
+    let (&severity, text) = packet.payload().split_first().filter(|_| packet.message_id == STATUSTEXT)?;
     let text: Vec<u8> = text.iter().copied().take(50).take_while(|&byte| byte != 0).collect();
     Some((severity, String::from_utf8_lossy(&text).into_owned()))
 }
 
 /// `MAV_AUTOPILOT` and `MAV_TYPE`.
 fn heartbeat(packet: &Packet) -> Option<(u8, u8)> {
-    let payload = payload(packet);
+    let payload = packet.payload();
     Some((*payload.get(5)?, *payload.get(4)?))
 }
 

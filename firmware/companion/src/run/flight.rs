@@ -4,16 +4,17 @@
 //! leave only after a poll: when this loop stops, both stop, and the autopilot's own failsafes act.
 
 use super::console::Console;
+use super::files::Files;
 use super::page::Page;
 use super::service::Service;
 use super::{Kept, Logs, unix_time_s};
 use crate::clock;
 use crate::logs::LogNews;
+use crate::models::{FlightPolicy, Models};
 use crate::radio::{Radio, describe};
 use crate::routing::Links;
 use gleaner_link::{MAX_FRAME_BYTES, Severity};
-use gleaner_pilot::{LookingAhead, Onboard, POLL_INTERVAL};
-use gleaner_policy::Engine;
+use gleaner_pilot::{Onboard, POLL_INTERVAL};
 use gleaner_ports::{Port, RECEIVE_BYTES, State as PortState, wait};
 use std::time::{Duration, Instant};
 
@@ -35,7 +36,9 @@ const TRAFFIC_PERIOD: Duration = Duration::from_secs(10);
 
 /// The pilot with everything around it.
 pub struct Flight {
-    onboard: Onboard<LookingAhead<Engine>>,
+    onboard: Onboard<FlightPolicy>,
+    models: Models,
+    files: Files,
     links: Links,
     radio: Option<Radio>,
     logs: Logs,
@@ -51,7 +54,7 @@ pub struct Flight {
 impl Flight {
     /// A pilot that has not been polled yet.
     pub fn new(
-        onboard: Onboard<LookingAhead<Engine>>,
+        (mut onboard, models): (Onboard<FlightPolicy>, Models),
         links: Links,
         radio: Option<Radio>,
         logs: Logs,
@@ -60,9 +63,16 @@ impl Flight {
         service: Service,
     ) -> Flight {
         let now = Instant::now();
+        let files = Files::new();
+        let (uri, crc) = files.general();
+        // The URI is short enough.
+        let _ = onboard.set_metadata(&uri, crc);
+        onboard.offer_models();
         let mut flight = Flight {
             revocations: onboard.revocations(),
             onboard,
+            models,
+            files,
             links,
             radio,
             logs,
@@ -117,9 +127,11 @@ impl Flight {
 
     /// Reads each port; whether bytes may be left.
     fn receive_turn(&mut self) -> bool {
-        let Flight { onboard, links, logs, console, radio, .. } = self;
+        let Flight { onboard, files, links, logs, console, radio, .. } = self;
         let mut more = links.receive(Instant::now(), READS_PER_TURN, |_, packet| {
-            onboard.receive_link(clock::now(), &packet.bytes);
+            if !files.take(packet, onboard.link().address()) {
+                onboard.receive_link(clock::now(), &packet.bytes);
+            }
             console.received(packet, onboard.link());
             if let Some(log) = &mut logs.telemetry {
                 log.write(&packet.bytes);
@@ -143,7 +155,11 @@ impl Flight {
         self.maintain(now);
         self.report_logs();
         self.take_page_commands(now);
+        for reply in self.files.replies() {
+            self.onboard.reply_file(reply.to, reply.header, &reply.data);
+        }
         self.onboard.poll(clock::at(now));
+        self.models.poll(&mut self.onboard);
         self.polled_at = now;
         self.service.feed(now);
         self.revoke();

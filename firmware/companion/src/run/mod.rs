@@ -1,23 +1,24 @@
 //! `gleaner run`: opens everything, then serves an autopilot until interrupted.
 
 mod console;
+mod files;
 mod flight;
 mod page;
 mod service;
 
 use crate::args::{self, Setup};
-use crate::clock;
 use crate::config::{self, Config, SigningConfig};
 use crate::error::StartError;
 use crate::keep::{LastRun, LastRunFile, ParameterFile};
 use crate::load;
-use crate::logs::{DecisionLog, LogNews, TelemetryLog};
+use crate::logs::{self, DecisionLog, LogNews, TelemetryLog};
+use crate::models::{self, Installed, Models};
 use crate::radio::Radio;
 use crate::routing::{Links, SignedPort, read_key};
 use console::Console;
 use flight::Flight;
 use gleaner_link::Parameters;
-use gleaner_pilot::{Budget, LookingAhead, Onboard};
+use gleaner_pilot::Onboard;
 use gleaner_ports::{Endpoint, Peers, Port};
 use page::Page;
 use service::Service;
@@ -33,15 +34,24 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let config = config::resolve(&order.setup)?;
     let load::Loaded { mission, rounded } = load::mission(&config.mission)?;
-    let engine = load::model(config.model.as_deref(), config.engine)?;
+    let installed = Installed::new(&config);
+    let (kept, mut parameters, mut lines) = Kept::open(&config, order.reset_parameters)?;
+    let (engine, number, refused) = installed.first(&mut parameters)?;
+    lines.extend(refused);
+    let file = load::model_name(installed.file(number).flatten());
     let model = format!("{}, engine {engine}", engine.name());
-    let (kept, parameters, lines) = Kept::open(&config, order.reset_parameters)?;
     let page = Page::open(&config, &mission, &parameters, &model)?;
     // The engine reproduced its golden pairs, or it would not have been loaded.
-    let policy = LookingAhead::new(engine, Budget::LINUX).with_clock(clock::now);
+    let policy = models::policy(engine);
+    let models = Models::start(installed, number);
     let onboard = Onboard::new(mission, parameters, config.settings, policy, Ok(()))
         .map_err(|source| StartError::Refused { path: config.mission.clone(), source })?;
     let logs = Logs::open(&config)?;
+    if let Some(folder) = &config.log_dir
+        && let Err(error) = logs::keep_mission(folder, onboard.machine().mission())
+    {
+        lines.push(format!("{}: {error}: `gleaner report` will need --mission", logs::MISSION));
+    }
     let links = open_links(&config)?;
     let open_radio = |endpoint| {
         let opened = Radio::open(endpoint, config.radio_format);
@@ -50,7 +60,13 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     let radio = config.radio.as_ref().map(open_radio).transpose()?;
     let stop = gleaner_ports::end_requested().map_err(StartError::Signals)?;
     let console = Console::start(order.verbose);
-    introduce(&config, &order.setup, &model, &links, radio.as_ref().map(Radio::port));
+    introduce(
+        &config,
+        &order.setup,
+        &format!("{model} ({})", file.display()),
+        &links,
+        radio.as_ref().map(Radio::port),
+    );
     tracing::info!("{}", lookahead(onboard.parameters().looks_ahead()));
     for line in page.introduction(config.page_tokens.is_some()) {
         tracing::info!("{line}");
@@ -64,7 +80,8 @@ pub fn run(order: &args::Run) -> Result<ExitCode, StartError> {
     for refused in service::become_real_time() {
         tracing::info!("not real time: {refused}");
     }
-    let mut flight = Flight::new(onboard, links, radio, logs, kept, (console, page), Service::new());
+    let mut flight =
+        Flight::new((onboard, models), links, radio, logs, kept, (console, page), Service::new());
     flight.fly(|| stop.load(Ordering::Relaxed));
     flight.end();
     Ok(ExitCode::SUCCESS)
@@ -102,8 +119,7 @@ fn signing(config: &Config, role: &str, number: u8) -> Result<Option<SignedPort>
 }
 
 fn introduce(config: &Config, setup: &Setup, model: &str, links: &Links, radio: Option<&Port>) {
-    let file = load::model_name(config.model.as_deref());
-    tracing::info!("gleaner {} with model {model} ({})", env!("CARGO_PKG_VERSION"), file.display());
+    tracing::info!("gleaner {} with model {model}", env!("CARGO_PKG_VERSION"));
     for (role, port) in links.ports().chain(radio.map(|port| ("radio", port))) {
         let at =
             port.local_address().map_or_else(String::new, |address| format!(", local address {address}"));

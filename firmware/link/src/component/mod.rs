@@ -4,6 +4,8 @@ mod answering;
 mod blocks;
 mod sending;
 
+pub use self::sending::FILE_DATA_BYTES;
+
 use self::blocks::Duplicate;
 
 use crate::address::Address;

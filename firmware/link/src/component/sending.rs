@@ -14,6 +14,9 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega as dialect;
 use mavlink::dialects::ardupilotmega::{MavAutopilot, MavModeFlag, MavProtocolCapability, MavState, MavType};
 
+/// Longest data of a MAVLink FTP answer of ours. The protocol permits 239; this component's frames are shorter.
+pub const FILE_DATA_BYTES: usize = 128;
+
 impl Component {
     pub(super) fn poll_heartbeat(&mut self, now: Instant, state: SystemState) {
         if self.heartbeat_at.is_some_and(|at| now.since(at) < Component::HEARTBEAT_PERIOD) {
@@ -87,7 +90,7 @@ impl Component {
 
     pub(super) fn send_autopilot_version(&mut self) {
         let version = dialect::AUTOPILOT_VERSION_DATA {
-            capabilities: capabilities(),
+            capabilities: self.capabilities(),
             flight_sw_version: software_version(),
             ..dialect::AUTOPILOT_VERSION_DATA::DEFAULT
         };
@@ -96,7 +99,7 @@ impl Component {
 
     pub(super) fn send_component_information(&mut self, now: Instant) {
         let information = dialect::COMPONENT_INFORMATION_BASIC_DATA {
-            capabilities: capabilities(),
+            capabilities: self.capabilities(),
             time_boot_ms: now.as_boot_ms(),
             vendor_name: "Gleaner".into(),
             model_name: "Gleaner".into(),
@@ -117,19 +120,34 @@ impl Component {
         self.send(Priority::Urgent, Packet::new(&data));
     }
 
+    /// Answers a MAVLink FTP request of `to`: sequence number, session, opcode, size, opcode of the request, burst flag,
+    /// padding and offset, then the data. Longer data than [`FILE_DATA_BYTES`] is not sent.
+    pub fn reply_file(&mut self, to: Address, header: [u8; 12], data: &[u8]) {
+        let mut payload: Vec<u8, { 15 + FILE_DATA_BYTES }> = Vec::from_array([0, to.system, to.component]);
+        if payload.extend_from_slice(&header).is_err() || payload.extend_from_slice(data).is_err() {
+            return;
+        }
+        let id = dialect::FILE_TRANSFER_PROTOCOL_DATA::ID;
+        let extra = dialect::FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC;
+        self.send(Priority::Bulk, Packet::from_payload(id, extra, &payload));
+    }
+
     /// Refuses a MAVLink FTP request at once, so that the ground station does not wait for a timeout.
     pub(super) fn refuse_file_request(&mut self, to: Address, sequence: u16, session: u8, opcode: u8) {
         const NAK: u8 = 129;
         const UNKNOWN_COMMAND: u8 = 7;
         let [low, high] = sequence.wrapping_add(1).to_le_bytes();
-        // Target network, system, component; then sequence, session, opcode, size, request's opcode, burst, padding,
-        // offset (4), data.
-        let (system, component) = (to.system, to.component);
-        let payload =
-            [0, system, component, low, high, session, NAK, 1, opcode, 0, 0, 0, 0, 0, 0, UNKNOWN_COMMAND];
-        let id = dialect::FILE_TRANSFER_PROTOCOL_DATA::ID;
-        let extra = dialect::FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC;
-        self.send(Priority::Bulk, Packet::from_payload(id, extra, &payload));
+        self.reply_file(to, [low, high, session, NAK, 1, opcode, 0, 0, 0, 0, 0, 0], &[UNKNOWN_COMMAND]);
+    }
+
+    fn capabilities(&self) -> MavProtocolCapability {
+        let files = match self.metadata {
+            Some(_) => MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP,
+            None => MavProtocolCapability::empty(),
+        };
+        MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | files
     }
 
     fn send(&mut self, priority: Priority, packet: Option<Packet>) {
@@ -148,11 +166,6 @@ fn tunnel_packet(target: Address, payload_type: u16, payload: &[u8]) -> Option<P
         Vec::from_array([type_low, type_high, target.system, target.component, length]);
     bytes.extend_from_slice(payload).ok()?;
     Packet::from_payload(dialect::TUNNEL_DATA::ID, dialect::TUNNEL_DATA::EXTRA_CRC, &bytes)
-}
-
-fn capabilities() -> MavProtocolCapability {
-    MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-        | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
 }
 
 /// The package's version as major, minor, patch and type 255 (`FIRMWARE_VERSION_TYPE_OFFICIAL`), one byte each.
