@@ -9,6 +9,7 @@ fn main() {
 #[cfg(any(feature = "f405", feature = "h743"))]
 mod board {
     use gleaner_pilot::{mission_file, mission_image};
+    use gleaner_units::BOARD_CELLS;
     use std::path::{Path, PathBuf};
     use std::{env, fs};
 
@@ -55,6 +56,12 @@ mod board {
             fs::read_to_string(path).map_err(|error| error.to_string())
         };
         match mission_file::read(&read(path), city) {
+            Ok(mission) if mission.grid().len() > BOARD_CELLS => stop(&format!(
+                "{}: {} cells, and a board has memory for {BOARD_CELLS}: choose larger cells, or fly it with a companion \
+                 computer",
+                path.display(),
+                mission.grid().len()
+            )),
             Ok(mission) => mission_image::encode(&mission).to_vec(),
             Err(error) => stop(&format!("{}: {error}", path.display())),
         }

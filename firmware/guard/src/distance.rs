@@ -17,7 +17,7 @@ impl DistanceField {
         DistanceField { grid, moves: [UNREACHED; MAX_CELLS] }
     }
 
-    /// Breadth-first search from `terminal` over the cells of `fence`, in place. The frontiers are cell sets of 256 bytes; a
+    /// Breadth-first search from `terminal` over the cells of `fence`, in place. The frontiers are cell sets; a
     /// queue would take as much stack as the field.
     pub(crate) fn search(&mut self, fence: &CellSet, terminal: Cell) {
         self.grid = fence.grid();

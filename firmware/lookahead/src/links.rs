@@ -5,7 +5,7 @@ use heapless::Vec;
 
 const WORDS: usize = MAX_CELLS / 32;
 
-/// Line of sight between up to `D` devices and all cells: a quarter of a kilobyte a device.
+/// Line of sight between up to `D` devices and all cells: one bit for each pair.
 ///
 /// The bits start as the map says and may be corrected in flight.
 #[derive(Clone, Debug)]

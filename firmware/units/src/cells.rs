@@ -1,4 +1,4 @@
-//! Sets of cells, 256 bytes each. The fence is one.
+//! Sets of cells, one bit each. The fence is one.
 
 use crate::{Cell, Grid, MAX_CELLS};
 
@@ -61,22 +61,27 @@ impl CellSet {
     /// Number of cells in the set.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.words.iter().map(|word| word.count_ones() as usize).sum()
+        self.used().map(|word| word.count_ones() as usize).sum()
     }
 
     /// Whether the set is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.words.iter().all(|&word| word == 0)
+        self.used().all(|&word| word == 0)
     }
 
     /// The cells in the set, in index order.
     pub fn iter(&self) -> impl Iterator<Item = Cell> + use<'_> {
-        let words = self.words.iter().enumerate().filter(|(_, bits)| **bits != 0);
+        let words = self.used().enumerate().filter(|(_, bits)| **bits != 0);
         let indices = words.flat_map(|(at, &bits)| {
             (0..32).filter(move |bit| bits & (1 << bit) != 0).map(move |bit| at * 32 + bit)
         });
         indices.filter_map(|index| self.grid.cell_at(index))
+    }
+
+    /// The words that this grid has cells for.
+    fn used(&self) -> impl Iterator<Item = &u32> {
+        self.words.iter().take(self.grid.len().div_ceil(32))
     }
 
     fn place(&self, cell: Cell) -> Option<(usize, u32)> {

@@ -4,8 +4,11 @@ use crate::{Action, Metres};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
-/// Most cells of a grid: the capacity of every table of cells on board.
-pub const MAX_CELLS: usize = 2048;
+/// Most cells of a grid on a board without an operating system.
+pub const BOARD_CELLS: usize = 2048;
+
+/// Most cells of a grid: the capacity of every table of cells. A computer has the memory for 128 x 128.
+pub const MAX_CELLS: usize = if cfg!(target_os = "none") { BOARD_CELLS } else { 128 * 128 };
 
 /// One cell: x counts east, y counts north, `(0, 0)` is the south-west corner of the grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -184,7 +187,8 @@ mod tests {
     #[test]
     fn invalid_grids_are_refused() {
         assert_eq!(Grid::new(0, 3, Metres(20.0)), Err(GridError::Empty));
-        assert_eq!(Grid::new(2000, 3, Metres(20.0)), Err(GridError::TooManyCells));
+        assert_eq!(Grid::new(129, 128, Metres(20.0)), Err(GridError::TooManyCells));
+        assert!(Grid::new(128, 128, Metres(20.0)).is_ok());
         assert_eq!(Grid::new(3, 3, Metres(f32::NAN)), Err(GridError::CellSize));
         assert_eq!(Grid::new(3, 3, Metres(0.0)), Err(GridError::CellSize));
     }

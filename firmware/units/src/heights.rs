@@ -3,7 +3,7 @@
 use crate::{Cell, Grid, GridError, MAX_CELLS, Metres};
 use core::fmt;
 
-/// Building heights of a grid in whole metres, 0 for open ground. Two kilobytes.
+/// Building heights of a grid in whole metres, 0 for open ground. One byte a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightMap {
     grid: Grid,

@@ -44,7 +44,7 @@ pub use action::{Action, ActionMask};
 pub use cells::CellSet;
 pub use decimal::Decimal;
 pub use frame::{GeoPoint, GridFrame, GridPoint, GridPose, Ned};
-pub use grid::{Cell, Grid, GridError, MAX_CELLS};
+pub use grid::{BOARD_CELLS, Cell, Grid, GridError, MAX_CELLS};
 pub use heights::{CsvError, CsvFault, HeightMap};
 pub use quantity::{BatteryUnits, Db, Dbm, Degrees, Metres, MetresPerSecond};
 pub use sight::{Rays, Sight};

@@ -1,30 +1,48 @@
-//! Line of sight from the ground to flight altitude, as a table.
+//! Line of sight from the ground to flight altitude.
 
 use gleaner_units::{Cell, Grid, HeightMap, Rays, Sight};
 
-/// Line of sight between open cells and cells at flight altitude: one bit for each pair.
+/// Cities with more cells have no table: it would take minutes and dozens of megabytes.
+const TABLE_CELLS: usize = 4096;
+const NO_ROW: u32 = u32::MAX;
+
+/// Line of sight between open cells and cells at flight altitude.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SightTable {
     grid: Grid,
     /// By grid index: the cell's row, or [`NO_ROW`] for a built cell.
     rows: Vec<u32>,
-    words_per_row: usize,
-    bits: Vec<u64>,
+    pairs: Pairs,
 }
 
-const NO_ROW: u32 = u32::MAX;
+/// The answer for a row and a cell at flight altitude.
+#[derive(Clone, Debug, PartialEq)]
+enum Pairs {
+    /// One bit for each pair. The rows are the open cells.
+    Table { words_per_row: usize, bits: Vec<u64> },
+    /// One ray for each question. The rows are the grid's indices.
+    Rays { heights: Box<HeightMap>, altitude_m: u16 },
+}
 
 impl SightTable {
     /// # Cost
-    /// One ray for each pair of an open cell and a cell: 0.85 million in the default city.
+    /// One ray for each pair of an open cell and a cell, 0.85 million in the default city; none for a city of more than
+    /// [`TABLE_CELLS`] cells, where each question costs one.
     pub(crate) fn new(heights: &HeightMap, altitude_m: u16) -> SightTable {
         let grid = heights.grid();
+        let open = || grid.cells().enumerate().filter(|&(_, cell)| heights.height_m(cell) == Some(0));
+        let mut rows = vec![NO_ROW; grid.len()];
+        if grid.len() > TABLE_CELLS {
+            for (index, _) in open() {
+                rows[index] = index as u32;
+            }
+            let pairs = Pairs::Rays { heights: Box::new(heights.clone()), altitude_m };
+            return SightTable { grid, rows, pairs };
+        }
         let rays = Rays { heights, altitude_m };
         let words_per_row = grid.len().div_ceil(64);
-        let mut rows = vec![NO_ROW; grid.len()];
         let mut bits = Vec::new();
-        let open = grid.cells().enumerate().filter(|&(_, cell)| heights.height_m(cell) == Some(0));
-        for (row, (index, device)) in (0..).zip(open) {
+        for (row, (index, device)) in (0..).zip(open()) {
             rows[index] = row;
             let begin = bits.len();
             bits.resize(begin + words_per_row, 0);
@@ -34,7 +52,7 @@ impl SightTable {
                 }
             }
         }
-        SightTable { grid, rows, words_per_row, bits }
+        SightTable { grid, rows, pairs: Pairs::Table { words_per_row, bits } }
     }
 
     /// The row of an open cell; `None` for a built cell and outside the grid.
@@ -44,7 +62,16 @@ impl SightTable {
 
     /// Whether there is line of sight between the open cell with this row and the cell with index `uav`.
     pub(crate) fn sees(&self, row: u32, uav: usize) -> bool {
-        self.bits[row as usize * self.words_per_row + uav / 64] & (1 << (uav % 64)) != 0
+        match &self.pairs {
+            Pairs::Table { words_per_row, bits } => {
+                bits[row as usize * words_per_row + uav / 64] & (1 << (uav % 64)) != 0
+            }
+            Pairs::Rays { heights, altitude_m } => {
+                let ends = (self.grid.cell_at(row as usize), self.grid.cell_at(uav));
+                let (Some(device), Some(uav)) = ends else { return false };
+                Rays { heights, altitude_m: *altitude_m }.sees(device, uav)
+            }
+        }
     }
 }
 
@@ -62,5 +89,21 @@ mod tests {
         assert_eq!(table.row(Cell::new(3, 1)), None);
         let seen: Vec<usize> = (0..9).filter(|&uav| table.sees(0, uav)).collect();
         assert_eq!(seen, [4]);
+    }
+
+    #[test]
+    fn a_city_without_a_table_gives_the_same_answers() {
+        let row = |at: usize| (0..80).map(|x| if (x * 7 + at * 3) % 5 == 0 { "40" } else { "0" });
+        let rows: Vec<String> = (0..60).map(|at| row(at).collect::<Vec<_>>().join(",")).collect();
+        let map = HeightMap::from_csv(&rows.join("\n"), Metres(20.0)).unwrap();
+        let sight = SightTable::new(&map, 60);
+        assert!(matches!(sight.pairs, Pairs::Rays { .. }));
+        let rays = Rays { heights: &map, altitude_m: 60 };
+        for (device, uav) in map.grid().cells().step_by(97).zip(map.grid().cells().skip(31).step_by(89)) {
+            let index = map.grid().index(uav).unwrap();
+            let sees = sight.row(device).map(|row| sight.sees(row, index));
+            let open = map.height_m(device) == Some(0);
+            assert_eq!(sees, open.then(|| rays.sees(device, uav)), "{device} {uav}");
+        }
     }
 }

@@ -245,13 +245,19 @@ mod tests {
 
     #[test]
     fn every_mission_comes_back_also_the_largest() {
-        for mission in [mission(40, 30, 6), mission(3, 3, 0), mission(1, 2, 1), mission(64, 32, 64)] {
+        for mission in [
+            mission(40, 30, 6),
+            mission(3, 3, 0),
+            mission(1, 2, 1),
+            mission(64, 32, 64),
+            mission(128, 128, 64),
+        ] {
             let mut image = encode(&mission);
             assert_eq!(decode(&image), Ok(mission.clone()));
             let _ = image.push(0xFF);
             assert_eq!(decode(&image), Ok(mission), "what follows is ignored");
         }
-        assert_eq!(encode(&mission(64, 32, 64)).len(), IMAGE_BYTES_MAX);
+        assert_eq!(encode(&mission(128, 128, 64)).len(), IMAGE_BYTES_MAX);
     }
 
     #[test]
