@@ -60,9 +60,9 @@ pub struct Report {
     /// The folder of decisions.jsonl and flight.tlog, or a decisions.jsonl. Its last run is shown.
     #[arg(value_name = "FLIGHT")]
     pub flight: PathBuf,
-    /// The mission that was flown.
+    /// The mission that was flown [default: mission.bin beside the decision log, which every run writes].
     #[arg(long, value_name = "FILE")]
-    pub mission: PathBuf,
+    pub mission: Option<PathBuf>,
     /// The page to write.
     #[arg(long, value_name = "FILE", default_value = "flight.html")]
     pub html: PathBuf,

@@ -81,6 +81,12 @@ pub enum StartError {
         /// Where.
         path: PathBuf,
     },
+    /// The flight's folder has no mission.
+    #[error("{}: is no mission of a flight: give the mission file with --mission", .path.display())]
+    NoMission {
+        /// Where.
+        path: PathBuf,
+    },
     /// A port cannot be opened.
     #[error("{role} port {source}")]
     Port {

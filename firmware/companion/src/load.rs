@@ -2,7 +2,7 @@
 
 use crate::text::{self, TextFault};
 use gleaner_pilot::mission_file::MissionFileError;
-use gleaner_pilot::{Mission, mission_file};
+use gleaner_pilot::{Mission, mission_file, mission_image};
 use gleaner_policy::onnx::ModelError;
 use gleaner_policy::{Engine, EngineKind};
 use gleaner_units::Metres;
@@ -85,6 +85,11 @@ pub fn model_bytes(path: Option<&Path>) -> Result<Vec<u8>, LoadError> {
 /// What messages call the model.
 pub fn model_name(path: Option<&Path>) -> PathBuf {
     path.map_or_else(|| PathBuf::from(SHIPPED_NAME), Path::to_owned)
+}
+
+/// The mission that a run left beside its logs; `None` where there is none.
+pub fn flown_mission(path: &Path) -> Option<Mission> {
+    mission_image::decode(&fs::read(path).ok()?).ok()
 }
 
 /// A mission, and what was noticed while its city was read.

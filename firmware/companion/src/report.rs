@@ -4,6 +4,7 @@ use crate::args::Report;
 use crate::config;
 use crate::error::StartError;
 use crate::load::{self, LoadError};
+use crate::logs::MISSION;
 use gleaner_dashboard::{Recording, render, scene, telemetry_frames};
 use gleaner_link::{Address, Parameters};
 use gleaner_pilot::{LoggedDecision, Settings};
@@ -19,13 +20,17 @@ const AUTOPILOT: u8 = 1;
 /// # Errors
 /// The mission, the model or the log cannot be read, the log holds no decision, or the page cannot be written.
 pub fn report(order: &Report) -> Result<ExitCode, StartError> {
-    let mission = load::mission(&order.mission)?.mission;
     let engine = load::model(order.model.as_deref(), None)?;
     let (settings, parameters) = match &order.config {
         Some(path) => config::identity(path)?,
         None => (Settings::default(), Parameters::default()),
     };
     let log = if order.flight.is_dir() { order.flight.join("decisions.jsonl") } else { order.flight.clone() };
+    let path = order.mission.clone().unwrap_or_else(|| log.with_file_name(MISSION));
+    let mission = match &order.mission {
+        Some(path) => load::mission(path)?.mission,
+        None => load::flown_mission(&path).ok_or_else(|| StartError::NoMission { path: path.clone() })?,
+    };
     let decisions = last_run(&log)?;
     let Some(first) = decisions.first() else { return Err(StartError::NoDecisions { path: log }) };
     let telemetry = fs::read(log.with_file_name("flight.tlog")).unwrap_or_default();
@@ -41,7 +46,7 @@ pub fn report(order: &Report) -> Result<ExitCode, StartError> {
     let title = format!(
         "flight of {} decisions, mission {}",
         decisions.len(),
-        order.mission.file_stem().unwrap_or_default().to_string_lossy()
+        path.file_stem().unwrap_or_default().to_string_lossy()
     );
     let mut recording = Recording::new(
         scene(&mission, parameters.altitude().0 as u16, title),

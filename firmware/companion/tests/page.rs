@@ -89,7 +89,6 @@ fn a_run_becomes_a_page_and_so_does_its_mission() {
         &gleaner()
             .arg("report")
             .arg(at("log"))
-            .args(["--mission".as_ref(), at("mission.toml").as_os_str()])
             .args(["--model".as_ref(), at("policy.onnx").as_os_str()])
             .args(["--html".as_ref(), at("flight.html").as_os_str()])
             .output()
@@ -100,6 +99,11 @@ fn a_run_becomes_a_page_and_so_does_its_mission() {
     let page = std::fs::read_to_string(at("flight.html")).unwrap();
     assert!(page.contains("shadow, commanding nothing"), "texts come from the telemetry");
     assert!(page.contains(r#""probabilities":["#) && page.contains(r#""attention":[["#));
+    // The mission stands beside the log.
+    std::fs::remove_file(at("log/mission.bin")).unwrap();
+    let (code, _, error) = outcome(&gleaner().arg("report").arg(at("log")).output().unwrap());
+    assert_eq!((code, error.lines().count()), (Some(2), 1), "{error}");
+    assert!(error.contains("mission.bin: is no mission of a flight: give the mission file"), "{error}");
     let (code, said, error) = outcome(
         &gleaner()
             .args(["mission", "show"])

@@ -4,7 +4,7 @@ mod atomic;
 mod last_run;
 mod parameters;
 
-pub use atomic::Replacer;
+pub use atomic::{Replacer, replace};
 pub use last_run::{LastRun, LastRunFile};
 pub use parameters::ParameterFile;
 

@@ -4,6 +4,7 @@ use super::ProgramError;
 use crate::journal::Slot;
 use crate::picture;
 use crate::{Figures, Simulation};
+use gleaner_pilot::mission_image;
 use serde::Serialize;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -43,7 +44,7 @@ struct Report<'r> {
     wall_s: f64,
 }
 
-/// Writes trajectory.svg, flight.tlog and decisions.jsonl into `folder`; where the picture is.
+/// Writes trajectory.svg, flight.tlog, decisions.jsonl and mission.bin into `folder`; where the picture is.
 pub(super) fn write_files(
     folder: &Path,
     simulation: &Simulation,
@@ -66,6 +67,8 @@ pub(super) fn write_files(
     };
     let journal = simulation.journal();
     write("flight.tlog", &|out| journal.write_tlog(out))?;
+    let mission = mission_image::encode(&simulation.setup().mission);
+    write("mission.bin", &|out| out.write_all(&mission))?;
     write("decisions.jsonl", &|out| journal.write_decisions(simulation.setup(), out))?;
     let picture = picture::trajectory(simulation, figures, model);
     let path = write("trajectory.svg", &|out| out.write_all(picture.as_bytes()))?;
