@@ -13,8 +13,13 @@ done
     echo "panics.sh: $image: cannot be read" >&2
     exit 2
 }
-arm-none-eabi-objdump -d --no-show-raw-insn "$image" |
-    sed -nE 's/^ *([0-9a-f]+):.*\tb[a-z.]*\t[0-9a-f]+ <(.*(panic|unwrap_failed|expect_failed|index_fail|len_mismatch).*)>$/\1 \2/p' |
+code=$(mktemp)
+trap 'rm -f "$code"' EXIT
+arm-none-eabi-objdump -d --no-show-raw-insn "$image" >"$code" || {
+    echo "panics.sh: $image: is no image for ARM" >&2
+    exit 2
+}
+sed -nE 's/^ *([0-9a-f]+):.*\tb[a-z.]*\t[0-9a-f]+ <(.*(panic|unwrap_failed|expect_failed|index_fail|len_mismatch).*)>$/\1 \2/p' "$code" |
     while read -r address callee; do
         echo "$callee"
         arm-none-eabi-addr2line -i -f -C -e "$image" "$address" | paste - - | sed 's/^/    /'

@@ -1,6 +1,7 @@
 //! The command line, parsed and checked. Nothing is done here.
 
 mod city;
+mod complaint;
 mod order;
 mod values;
 
@@ -234,7 +235,7 @@ impl Arguments {
                 0
             }
             _ => {
-                eprintln!("gleaner-sitl: {}: see `gleaner-sitl --help`", one_line(&error.to_string()));
+                eprintln!("gleaner-sitl: {}", complaint::of(&error));
                 2
             }
         })
@@ -335,13 +336,6 @@ impl SweepArguments {
             keep: self.keep,
         }
     }
-}
-
-/// The cause, without the usage and the tips that follow it.
-fn one_line(text: &str) -> String {
-    let cause = text.split("\n\n").next().unwrap_or(text);
-    let words: Vec<&str> = cause.split_whitespace().collect();
-    words.join(" ").trim_start_matches("error: ").to_owned()
 }
 
 #[cfg(test)]
