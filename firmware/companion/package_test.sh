@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Tries the packages of package.sh as a new user does, and fails with the first step that does not work:
-#   amd64   installed with apt into a Debian root; check; run against the simulated autopilot; removed
+#   amd64   installed with apt into a Debian root; check; run against the simulated autopilot; the ground-station kit; the
+#           report of the run; removed
 #   arm64   unpacked, and checked under user-mode emulation
 #   static  checked in a folder that holds nothing else
 # usage: firmware/companion/package_test.sh [amd64|arm64|static]...      without a name: amd64
@@ -59,7 +60,9 @@ try_amd64() {
     chroot "$root" apt-get install -y --no-install-recommends /tmp/gleaner.deb >"$work/apt.log" 2>&1 ||
         fail "apt install: $(tail -n 3 "$work/apt.log")"
     for file in usr/bin/gleaner etc/gleaner/{gleaner.toml,mission.toml,city.csv} usr/share/gleaner/models/gleaner.onnx \
-        usr/share/gleaner/ground-station/gleaner.MavlinkActions.json usr/share/gleaner/examples/pytorch_policy.py; do
+        usr/share/gleaner/ground-station/{gleaner.MavlinkActions.json,mavproxy_gleaner.py} \
+        usr/share/gleaner/routers/{mavlink-router.conf,mavlink-server.sh} \
+        usr/share/gleaner/examples/pytorch_policy.py; do
         [[ -f $root/$file ]] || fail "the package has no /$file"
     done
     compgen -G "$root/*/lib/systemd/system/gleaner.service" >/dev/null ||
@@ -76,12 +79,12 @@ try_amd64() {
     [[ ! -e $root/usr/bin/gleaner ]] || fail "the program is still there after its removal"
     grep -q '# edited' "$root/etc/gleaner/gleaner.toml" || fail "the removal took the configuration"
     [[ -f $root/var/log/gleaner/decisions.jsonl ]] || fail "the removal took the logs"
-    echo "amd64: installed, checked, run, removed"
+    echo "amd64: installed, checked, run${tried_kit:+ with a ground station}, removed"
 }
 
 # The installed program serves the simulated autopilot of the build.
 try_run() {
-    local root=$1 log=$2 sitl=$repository/target/release/gleaner-sitl port running
+    local root=$1 log=$2 sitl=$repository/target/release/gleaner-sitl port station running
     [[ -x $sitl ]] || fail "gleaner-sitl is not built: cargo build --release"
     : >"$work/serve.log"
     : >"$log"
@@ -94,18 +97,41 @@ try_run() {
         sleep 1
     done
     [[ -n $port ]] || fail "gleaner-sitl serve does not say its port: $(head -n 5 "$work/serve.log")"
-    timeout 20 chroot "$root" gleaner run --config /etc/gleaner/gleaner.toml --autopilot "tcpout:127.0.0.1:$port" \
-        --radio udpin:127.0.0.1:0 --log /tmp/log >"$log" 2>&1 &
+    station=$(sed -n 's/^gcs.*:\([0-9]\{2,\}\).*/\1/p' "$work/serve.log" | head -n 1)
+    timeout 180 chroot "$root" gleaner run --config /etc/gleaner/gleaner.toml --autopilot "tcpout:127.0.0.1:$port" \
+        --radio udpin:127.0.0.1:0 --log /tmp/log --state /tmp/state >"$log" 2>&1 &
     running=$!
     for ((second = 0; second < 15; second++)); do
         ! grep -q "serving ArduPilot" "$log" || break
         sleep 1
     done
+    try_kit "$root" "$station"
     kill -TERM "$running"
     wait "$running" || true
     kill "$serving"
     serving=
     grep -q "serving ArduPilot on a quadrotor" "$log" || fail "gleaner run serves no autopilot: $(tail -n 5 "$log")"
+    # What a ground station set is kept, and the flight becomes a page.
+    if [[ -n $tried_kit ]]; then
+        grep -q "GLN_W_DATA = 0.125" "$root/tmp/state/parameters.toml" || fail "the preference was not kept"
+    fi
+    if [[ -s $root/tmp/log/decisions.jsonl ]]; then
+        chroot "$root" gleaner report /tmp/log --html /tmp/flight.html || fail "the run does not become a page"
+    fi
+}
+
+# Every button of the QGroundControl file and every command of the MAVProxy module, as installed. The Python programs are
+# those of the tests.
+tried_kit=
+try_kit() {
+    local root=$1 station=$2 python=$repository/target/venv/bin/python
+    if ! [[ -x $python ]]; then
+        echo "package_test.sh: the ground-station kit is not tried: cargo test makes target/venv" >&2
+        return
+    fi
+    "$python" "$repository/tests/python/kit_station.py" "udpout:127.0.0.1:$station" \
+        "$root/usr/share/gleaner/ground-station" >"$work/kit.log" 2>&1 || fail "kit: $(tail -n 3 "$work/kit.log")"
+    tried_kit=yes
 }
 
 try_arm64() {

@@ -5,6 +5,7 @@
 //! the programs are built, with
 //! `cargo test --release --workspace --test ground_station -- --nocapture`.
 
+use gleaner_tests::programs::repository;
 use gleaner_tests::python;
 use gleaner_tests::serving::{Link, Serving};
 use serde_json::Value;
@@ -15,8 +16,12 @@ const TERMINAL: [i64; 2] = [30, 18];
 
 /// What a ground station's script has seen.
 fn judged_by(script: &str, scheme: &str, serving: &Serving) -> Value {
-    let seen = python::run(script, [format!("{scheme}{}", serving.station)])
-        .unwrap_or_else(|cause| panic!("{cause:#}"));
+    judged_with(script, &[&format!("{scheme}{}", serving.station)])
+}
+
+/// As [`judged_by`], with these arguments.
+fn judged_with(script: &str, arguments: &[&str]) -> Value {
+    let seen = python::run(script, arguments).unwrap_or_else(|cause| panic!("{cause:#}"));
     println!("{script}: {seen}");
     serde_json::from_str(seen.lines().last().expect("a line")).expect("JSON")
 }
@@ -70,4 +75,26 @@ fn mavsdk_engages_switches_and_takes_over() {
 fn mavproxy_engages_switches_and_takes_over() {
     let seen = judged_by("mavproxy_station.py", "udpout:", &Serving::start(Link::Tcp, &[]));
     assert!(seen["decisions"].as_u64().unwrap() >= 3, "{seen}");
+}
+
+#[test]
+fn pymavlink_and_mavsdk_read_the_parameter_metadata() {
+    let seen = judged_by("metadata_station.py", "", &Serving::start(Link::Tcp, &[]));
+    let parameters = seen["parameters"].as_array().unwrap();
+    assert_eq!(parameters.len(), gleaner_link::PARAMETERS.len());
+    for (read, spec) in parameters.iter().zip(gleaner_link::PARAMETERS) {
+        assert_eq!(read["name"], spec.name);
+        let bound = |key: &str| read[key].as_f64().unwrap() as f32;
+        assert_eq!((bound("min"), bound("max")), (spec.min, spec.max), "{read}");
+        assert_eq!(read["units"].as_str().unwrap_or(""), spec.unit, "{read}");
+    }
+}
+
+#[test]
+fn every_button_and_command_of_the_kit_works() {
+    let serving = Serving::start(Link::Tcp, &[]);
+    let kit = repository().join("firmware/companion/dist/ground-station");
+    let connection = format!("udpout:{}", serving.station);
+    let seen = judged_with("kit_station.py", &[&connection, kit.to_str().unwrap()]);
+    assert!(seen["results"].as_object().unwrap().len() >= 8, "{seen}");
 }

@@ -1,6 +1,7 @@
 """MAVProxy module: command Gleaner, the pilot on a companion computer (component 191).
 
-Copy this file into a folder of the Python path and type `module load gleaner`, then one of
+Copy this file into a folder of the Python path and type `module load mavproxy_gleaner` (in MAVProxy's own folder `modules`:
+`module load gleaner`), then one of
 
     gleaner engage | off | shadow | return
     gleaner w 0.25          the preference: weight of data, 0 to 1
