@@ -60,7 +60,7 @@ impl Installed {
     pub fn first(&self, parameters: &mut Parameters) -> Result<(Engine, usize, Option<String>), LoadError> {
         let wanted = parameters.model();
         let chosen = match usize::try_from(wanted) {
-            Ok(number) if number == 0 => return Ok((self.load(0)?, 0, None)),
+            Ok(0) => return Ok((self.load(0)?, 0, None)),
             Ok(number) if number <= self.last() => self.load(number).map_err(|error| error.to_string()),
             _ => Err(format!("there are models 0..{}", self.last())),
         };
