@@ -93,8 +93,9 @@ mod tests {
 
     #[test]
     fn a_city_without_a_table_gives_the_same_answers() {
-        let row = |at: usize| (0..80).map(|x| if (x * 7 + at * 3) % 5 == 0 { "40" } else { "0" });
-        let rows: Vec<String> = (0..60).map(|at| row(at).collect::<Vec<_>>().join(",")).collect();
+        let height = |x: usize, y: usize| if (x * 7 + y * 3).is_multiple_of(5) { "40" } else { "0" };
+        let row = |y: usize| (0..80).map(|x| height(x, y)).collect::<Vec<_>>().join(",");
+        let rows: Vec<String> = (0..60).map(row).collect();
         let map = HeightMap::from_csv(&rows.join("\n"), Metres(20.0)).unwrap();
         let sight = SightTable::new(&map, 60);
         assert!(matches!(sight.pairs, Pairs::Rays { .. }));

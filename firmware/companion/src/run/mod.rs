@@ -18,7 +18,7 @@ use crate::routing::{Links, SignedPort, read_key};
 use console::Console;
 use flight::Flight;
 use gleaner_link::Parameters;
-use gleaner_pilot::Onboard;
+use gleaner_pilot::{Budget, Onboard};
 use gleaner_ports::{Endpoint, Peers, Port};
 use page::Page;
 use service::Service;
