@@ -55,7 +55,9 @@ pub enum StartError {
     },
     /// This program cannot run the graph of a model of one's own.
     #[cfg(not(feature = "tract"))]
-    #[error("sealing needs the engine tract, which this program has not: build it with `--features tract`")]
+    #[error(
+        "sealing needs the engine tract, which this program has not: use the program of the Debian package"
+    )]
     NoTract,
     /// A result cannot be written.
     #[error("{}: cannot be written: {source}: give another path with --out, or correct its permissions", .path.display())]
