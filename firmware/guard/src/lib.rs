@@ -23,7 +23,7 @@
 //! # When you may trust this
 //! The theorem is about cells and a battery level in units. It assumes:
 //! - **Unit price.** A move takes at most one unit and a hover at most half of one. The pilot learns the real prices from the
-//!   measured charge and offers the guard the charge divided by the higher one, with a margin of 3 %. Until the battery has
+//!   measured charge and offers the guard the charge divided by the higher one, with a margin of 5 %. Until the battery has
 //!   shown a few percent of use, the nominal price holds.
 //! - **Wind.** A price learned on the way out is assumed on the way home. A headwind that begins later, or on one course only,
 //!   is not covered until it is learned; `GLN_RESERVE` is for that.

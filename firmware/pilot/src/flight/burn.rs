@@ -8,37 +8,38 @@
 //! units used = cell x cells flown + hover x nominal units hovered
 //! ```
 //!
-//! and the two prices are the least-squares solution over the last steps, with a prior that both are 1. Where the monitor
-//! counts mAh, and these agree with the percentage, each half percent of them gives such an equation instead
+//! and the two prices are the least-squares solution over the last steps, with a prior that both are 1 ([`Prices`]). Where
+//! the monitor counts mAh, and these agree with the percentage, each half percent of them gives such an equation instead
 //! ([`super::charge`]).
+//!
+//! The price of the last few steps is watched beside that of the last 25. When it is clearly higher, the older steps
+//! belong to another wind and are dropped.
 
 use crate::flight::charge::Charge;
+use crate::flight::prices::{Flown, Prices};
 use gleaner_units::BatteryUnits;
 
 /// Nominal units per second of hovering: half a unit for the two seconds in which 20 m are flown at 10 m/s.
 pub(crate) const HOVER_UNITS_PER_S: f32 = 0.25;
 /// Weight of an older equation per newer one: a window of about 25 steps.
 const DECAY: f32 = 0.96;
-/// Weight of the prior, in squared nominal units.
-const PRIOR: f32 = 0.3;
+/// The same for the last few steps: about five.
+const RECENT_DECAY: f32 = 0.8;
+/// The last steps cost more by this factor: the older ones are dropped. The time of a step is known to one report of the
+/// battery, 2 s on PX4, which makes the price of five steps uncertain by about 8 %.
+const DEARER: f32 = 1.15;
+/// Weight that the last steps keep then: some of them are from before the change.
+const KEPT: f32 = 0.3;
+/// Steps that must have been seen to be compared, by weight.
+const RECENT_STEPS: f32 = 2.0;
 /// A larger step within one report is a fault of the monitor or of a cell, not consumption.
 pub(crate) const JUMP_PERCENT: u8 = 5;
 /// A price that is learned this close to the nominal one is noise of whole percents.
 const NOISE: f32 = 1.05;
 /// Percent that an equation from mAh spans at least.
 const MAH_PERCENT: f32 = 0.5;
-/// Bounds of a learned price: beyond them the monitor is at fault, not the wind.
-const CHEAPEST: f32 = 0.3;
-const DEAREST: f32 = 3.0;
 /// Margin on a learned price.
-const MARGIN: f32 = 1.03;
-
-/// Nominal units flown since a percentage step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Flown {
-    cells: f32,
-    hover: f32,
-}
+const MARGIN: f32 = 1.05;
 
 /// What a new percentage means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +55,9 @@ pub(crate) enum Reading {
 /// The prices of a cell and of hovering.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Burn {
-    /// Normal equations: cells x cells, cells x hover, hover x hover, cells x used, hover x used.
-    sums: [f32; 5],
+    prices: Prices,
+    /// Of the last few steps.
+    recent: Prices,
     flown: Flown,
     percent: Option<u8>,
     /// Whether the percentage has stepped since it was first seen: before that the interval has no exact start.
@@ -68,7 +70,8 @@ pub(crate) struct Burn {
 impl Burn {
     pub(crate) const fn new() -> Burn {
         Burn {
-            sums: [0.0; 5],
+            prices: Prices::new(),
+            recent: Prices::new(),
             flown: Flown { cells: 0.0, hover: 0.0 },
             percent: None,
             anchored: false,
@@ -150,36 +153,32 @@ impl Burn {
         }
     }
 
-    fn learn(&mut self, Flown { cells, hover }: Flown, used: f32) {
-        let terms = [cells * cells, cells * hover, hover * hover, cells * used, hover * used];
-        for (sum, term) in self.sums.iter_mut().zip(terms) {
-            *sum = *sum * DECAY + term;
+    fn learn(&mut self, flown: Flown, used: f32) {
+        self.prices.learn(flown, used, DECAY);
+        self.recent.learn(flown, used, RECENT_DECAY);
+        let recently = self.recent.flown();
+        let is_enough = recently.units() >= RECENT_STEPS;
+        if is_enough && self.recent.mean() > DEARER * self.prices.mean_of(recently) {
+            self.prices = self.recent.fraction(KEPT);
         }
     }
 
     /// Units that a cell and a nominal unit of hovering take, as learned.
     pub(crate) fn learned(&self) -> (f32, f32) {
-        let [cc, ch, hh, cu, hu] = self.sums;
-        let (cc, hh, cu, hu) = (cc + PRIOR, hh + PRIOR, cu + PRIOR, hu + PRIOR);
-        let determinant = cc * hh - ch * ch;
-        let solved = ((cu * hh - hu * ch) / determinant, (hu * cc - cu * ch) / determinant);
-        let sound = |price: f32| if price.is_finite() { price.clamp(CHEAPEST, DEAREST) } else { 1.0 };
-        (sound(solved.0), sound(solved.1))
+        self.prices.solve()
     }
 
-    /// The price of a nominal unit that the way home is judged by: never below 1. `slot_s` is the time of a hover, which
-    /// the guard prices at half a unit however long it is.
+    /// The price of a nominal unit that the way home is judged by: never below 1. `slot_s` is the time of a slot: the
+    /// guard prices a hover at half a unit and a cell at one, however long they last.
     pub(crate) fn price(&self, slot_s: f32) -> f32 {
+        let slot = slot_s * HOVER_UNITS_PER_S;
+        if !self.prices.has_learned() {
+            // A cell takes at least the hovering power of its time.
+            return if slot > 1.0 { slot } else { 1.0 };
+        }
         let (cell, hover) = self.learned();
-        let dearest = cell.max(hover * slot_s * HOVER_UNITS_PER_S / 0.5);
-        // A longer slot is dear before anything is learned; only what was learned counts here.
-        let dearest = if self.has_learned() { dearest } else { 1.0 };
+        let dearest = cell.max(hover * slot / 0.5);
         if dearest > NOISE { dearest * MARGIN } else { 1.0 }
-    }
-
-    fn has_learned(&self) -> bool {
-        let [cc, _, hh, ..] = self.sums;
-        cc + hh > 0.0
     }
 }
 
@@ -250,10 +249,34 @@ mod tests {
     #[test]
     fn the_price_never_falls_below_nominal() {
         assert_eq!(Burn::new().price(2.0), 1.0);
-        assert_eq!(Burn::new().price(6.7), 1.0, "nothing learned yet");
+        assert_eq!(Burn::new().price(4.0), 1.0);
+        assert_eq!(Burn::new().price(8.0), 2.0, "a slow cell takes as much as hovering for so long");
         assert_eq!(fly(0.98, 0.32, 40).price(2.0), 1.0);
         let windy = fly(1.5, 0.6, 40).price(2.0);
         assert!((1.45..1.75).contains(&windy), "{windy}");
+    }
+
+    /// Nominal consumption, then wind: many cheap steps must not outweigh few dear ones.
+    #[test]
+    fn a_dearer_wind_is_learned_in_eight_percent() {
+        for price in [1.4, 1.8, 2.4] {
+            let mut burn = Burn::new();
+            let mut left = 90.5_f32;
+            let mut fly = |burn: &mut Burn, price: f32, percent: f32| {
+                let until = left - percent;
+                while left > until {
+                    burn.flew(0.05);
+                    left -= 0.05 * price;
+                    burn.read(left as u8, None, FULL);
+                }
+            };
+            fly(&mut burn, 0.98, 40.0);
+            assert_eq!(burn.price(2.0), 1.0);
+            fly(&mut burn, price, 8.0);
+            assert!(burn.price(2.0) > 0.96 * price, "{} for {price}", burn.price(2.0));
+            fly(&mut burn, price, 20.0);
+            assert!(burn.price(2.0) < 1.15 * price, "{} for {price}", burn.price(2.0));
+        }
     }
 
     #[test]

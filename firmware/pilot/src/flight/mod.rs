@@ -7,6 +7,7 @@ pub(crate) mod course;
 pub(crate) mod energy;
 pub(crate) mod leg;
 pub(crate) mod plan;
+pub(crate) mod prices;
 pub(crate) mod speed;
 pub(crate) mod stream;
 pub(crate) mod track;

@@ -112,7 +112,8 @@ impl Flight {
         let passed = scene.now.since(core::mem::replace(&mut self.stepped_at, scene.now)).as_secs_f32();
         self.count_energy(scene, &position, passed, energy, out);
         if let Some(landing) = &mut self.landing {
-            return landing.step(scene, out);
+            let is_over = self.plan.frame.cell(&position) == Some(self.course.leg.cell);
+            return landing.step(scene, is_over, out);
         }
         self.speed.keep(scene, out);
         if self.homing.is_none()

@@ -176,6 +176,30 @@ fn the_price_of_a_unit_is_learned_and_the_landing_stays_covered() {
     }
 }
 
+/// Cheap cells first, then wind while it hovers far out: the way home is flown in the wind.
+#[test]
+fn a_price_that_rises_in_flight_still_covers_the_landing() {
+    let landing = 60.0 / 1.05 * 0.225;
+    for risen in [1.5, 2.0, 2.5] {
+        let mut mission = crate::rig::mission();
+        mission.budget = BatteryUnits(80.0);
+        let mut rig = Rig::with(mission, true);
+        rig.engage();
+        rig.policy.then = Action::North;
+        let (mut left, mut last_m) = (90.9_f32, 0.0);
+        while rig.commanded(AutopilotCommand::Land) == 0 && left > 0.0 {
+            let before = rig.vehicle.position.unwrap();
+            rig.step();
+            let moved_m = rig.vehicle.position.unwrap().horizontal_distance(&before).0;
+            let moves = moved_m + std::mem::replace(&mut last_m, moved_m) > 0.0;
+            let price = if left > 55.0 { 0.7 } else { risen };
+            left -= price * if moves { moved_m / 20.0 } else { 0.5 / 40.0 };
+            rig.vehicle.battery_percent = Some(left.max(0.0) as u8);
+        }
+        assert!(left >= landing * risen, "{left} left at {risen}, {:?}", rig.texts);
+    }
+}
+
 #[test]
 fn telemetry_shows_the_learned_price_and_the_charge_at_touchdown() {
     let (rig, left) = fly_at(1.5, Action::North);

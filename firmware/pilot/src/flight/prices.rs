@@ -1,0 +1,125 @@
+//! Least squares of two prices: of a cell, and of a nominal unit of hovering.
+
+/// Weight of the prior, in equations. The prior is that cells and hovering cost the same per nominal unit: what was not
+/// flown yet costs as the rest.
+const PRIOR: f32 = 0.2;
+/// Bounds of a price: beyond them the monitor is at fault, not the wind.
+const CHEAPEST: f32 = 0.3;
+const DEAREST: f32 = 3.0;
+/// Less is flown between two steps only when the charge falls by itself.
+const LEAST_UNITS: f32 = 0.05;
+
+/// Nominal units flown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Flown {
+    pub(crate) cells: f32,
+    pub(crate) hover: f32,
+}
+
+impl Flown {
+    pub(crate) fn units(self) -> f32 {
+        self.cells + self.hover
+    }
+}
+
+/// Sums over the equations `used = cell x cells + hover x hover`, older ones with less weight.
+///
+/// Each equation is divided by the units flown: it then has the mean price of its interval on the left. A step of the
+/// percentage spans many cheap units or few dear ones; undivided, the squares of the cheap ones would prevail.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Prices {
+    /// Normal equations: cells x cells, cells x hover, hover x hover, cells x used, hover x used.
+    sums: [f32; 5],
+}
+
+impl Prices {
+    pub(crate) const fn new() -> Prices {
+        Prices { sums: [0.0; 5] }
+    }
+
+    /// Takes in one equation. `decay`: what is left of the weight of the older ones.
+    pub(crate) fn learn(&mut self, flown: Flown, used: f32, decay: f32) {
+        let units = flown.units();
+        if units.is_nan() || units < LEAST_UNITS {
+            return;
+        }
+        let Flown { cells, hover } = flown;
+        let terms = [cells * cells, cells * hover, hover * hover, cells * used, hover * used];
+        for (sum, term) in self.sums.iter_mut().zip(terms) {
+            *sum = *sum * decay + term / (units * units);
+        }
+    }
+
+    /// The same prices, as if this fraction of the equations had been seen.
+    pub(crate) fn fraction(self, share: f32) -> Prices {
+        Prices { sums: self.sums.map(|sum| sum * share) }
+    }
+
+    /// Prices of a cell and of a nominal unit of hovering.
+    pub(crate) fn solve(&self) -> (f32, f32) {
+        let [cc, ch, hh, cu, hu] = self.sums;
+        let common = PRIOR * self.mean();
+        let (cc, hh, cu, hu) = (cc + PRIOR, hh + PRIOR, cu + common, hu + common);
+        let determinant = cc * hh - ch * ch;
+        let solved = ((cu * hh - hu * ch) / determinant, (hu * cc - cu * ch) / determinant);
+        let sound = |price: f32| if price.is_finite() { price.max(CHEAPEST).min(DEAREST) } else { 1.0 };
+        (sound(solved.0), sound(solved.1))
+    }
+
+    /// The mean price of `flown`.
+    pub(crate) fn mean_of(&self, flown: Flown) -> f32 {
+        let (cell, hover) = self.solve();
+        (cell * flown.cells + hover * flown.hover) / flown.units()
+    }
+
+    /// Cells and hovering in the equations, by weight; together they are the number of equations.
+    pub(crate) fn flown(&self) -> Flown {
+        let [cc, ch, hh, ..] = self.sums;
+        Flown { cells: cc + ch, hover: hh + ch }
+    }
+
+    /// The mean price in the equations; 1 before there is one.
+    pub(crate) fn mean(&self) -> f32 {
+        let ([.., cu, hu], equations) = (self.sums, self.flown().units());
+        if equations > 0.0 { (cu + hu) / equations } else { 1.0 }
+    }
+
+    pub(crate) fn has_learned(&self) -> bool {
+        self.flown().units() > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_prices_explain_the_equations() {
+        let mut prices = Prices::new();
+        for (cells, hover) in [(1.0, 0.0), (0.5, 0.5), (0.0, 1.0), (0.8, 0.1)].repeat(10) {
+            prices.learn(Flown { cells, hover }, 1.6 * cells + 0.8 * hover, 1.0);
+        }
+        let (cell, hover) = prices.solve();
+        assert!((cell - 1.6).abs() < 0.05 && (hover - 0.8).abs() < 0.05, "{cell} {hover}");
+        let flown = prices.flown();
+        assert!((flown.units() - 40.0).abs() < 0.01, "{flown:?}");
+        assert!((prices.mean() - prices.mean_of(flown)).abs() < 0.02);
+    }
+
+    #[test]
+    fn hovering_that_was_not_flown_costs_as_the_cells() {
+        let mut prices = Prices::new();
+        (0..5).for_each(|_| prices.learn(Flown { cells: 0.5, hover: 0.0 }, 1.0, 1.0));
+        let (cell, hover) = prices.solve();
+        assert!((cell - 2.0).abs() < 1e-3 && (hover - 2.0).abs() < 1e-3, "{cell} {hover}");
+    }
+
+    #[test]
+    fn charge_that_falls_by_itself_teaches_nothing() {
+        let mut prices = Prices::new();
+        prices.learn(Flown::default(), 3.0, 1.0);
+        prices.learn(Flown { cells: f32::NAN, hover: 0.0 }, 3.0, 1.0);
+        assert!(!prices.has_learned());
+        assert_eq!(prices.solve(), (1.0, 1.0));
+    }
+}
