@@ -122,7 +122,7 @@ pub fn mission(path: &Path) -> Result<Loaded, LoadError> {
             .map_err(|error| format!("cannot be read: {error}: put the city beside the mission"))?;
         let city = text::decode(bytes).map_err(|fault| fault.to_string())?;
         // Faults are reported by the mission's reader.
-        rounded = read_city(city.as_bytes(), Metres(1.0)).map_or(0, |city| city.rounded);
+        rounded += read_city(city.as_bytes(), Metres(1.0)).map_or(0, |city| city.rounded);
         Ok(city)
     };
     match mission_file::read(&text, city) {

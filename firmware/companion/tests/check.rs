@@ -58,7 +58,7 @@ fn every_fault_is_printed() {
         ("ok    mission", "terminal (3, 2)"),
         ("FAIL  way home   20 battery units do not cover", "raise battery_units or lower GLN_RESERVE"),
         ("FAIL  battery    the mission takes 20 units", "lower battery_units or correct GLN_BAT_UNITS"),
-        ("FAIL  altitude   30 m is not above the tallest building of 33 m", "raise GLN_ALT"),
+        ("FAIL  altitude   30 m is not above the highest roof of 33 m", "raise GLN_ALT"),
         ("FAIL  model", "export the model again, or report this machine"),
         ("FAIL  autopilot", "or choose another number"),
         ("FAIL  log", "or correct its permissions"),

@@ -73,13 +73,14 @@ pub struct Operators {
 }
 
 impl Default for Operators {
-    /// System 255, which ground stations use, and component 190 of any system (`MAV_COMP_ID_MISSIONPLANNER`, "GCS or
-    /// developer API"), which MAVSDK and QGroundControl use.
+    /// System 255, which ground stations use (ArduPilot's `SYSID_MYGCS`), and 245/190, which MAVSDK uses as a ground
+    /// station. MAVLink names component 190 (`MAV_COMP_ID_MISSIONPLANNER`) "GCS or developer API": on the system of a
+    /// vehicle it is a program on board, and commands only if it is listed.
     fn default() -> Operators {
         let mut operators = Operators::none();
         let defaults = [
             Operator { system: Some(255), component: None },
-            Operator { system: None, component: Some(190) },
+            Operator { system: Some(245), component: Some(190) },
         ];
         for operator in defaults {
             let _ = operators.add(operator);
@@ -138,7 +139,7 @@ mod tests {
         for sender in [(255, 190), (255, 230), (245, 190)] {
             assert!(operators.allow(Address::new(sender.0, sender.1)), "{sender:?}");
         }
-        for sender in [(1, 1), (254, 191), (7, 192)] {
+        for sender in [(1, 1), (254, 191), (7, 192), (1, 190), (2, 190), (245, 191)] {
             assert!(!operators.allow(Address::new(sender.0, sender.1)), "{sender:?}");
         }
     }

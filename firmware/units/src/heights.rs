@@ -8,6 +8,8 @@ use core::fmt;
 pub struct HeightMap {
     grid: Grid,
     heights_m: [u8; MAX_CELLS],
+    /// See [`HeightMap::highest`]; `None` on flat ground.
+    highest_m: Option<u16>,
 }
 
 /// A fault in a city file. Line and column count from 1; a column is a value.
@@ -49,7 +51,7 @@ impl HeightMap {
     /// A city without buildings.
     #[must_use]
     pub const fn flat(grid: Grid) -> HeightMap {
-        HeightMap { grid, heights_m: [0; MAX_CELLS] }
+        HeightMap { grid, heights_m: [0; MAX_CELLS], highest_m: None }
     }
 
     /// Reads a city file: heights in whole metres, one row a line from north to south, columns from west to
@@ -122,10 +124,28 @@ impl HeightMap {
         self.heights_m.get(..self.grid.len()).unwrap_or(&[])
     }
 
-    /// Height of the tallest building.
+    /// Height of the tallest building above its ground.
     #[must_use]
     pub fn tallest(&self) -> Metres {
         Metres(f32::from(self.as_slice().iter().copied().max().unwrap_or(0)))
+    }
+
+    /// The highest roof or hill above the take-off point. On flat ground, as long as nothing else is stated, the tallest
+    /// building.
+    #[must_use]
+    pub fn highest(&self) -> Metres {
+        self.highest_m.map_or_else(|| self.tallest(), |height_m| Metres(f32::from(height_m)))
+    }
+
+    /// The stated height of [`HeightMap::highest`] in whole metres.
+    #[must_use]
+    pub const fn stated_highest_m(&self) -> Option<u16> {
+        self.highest_m
+    }
+
+    /// States [`HeightMap::highest`], where the ground is not flat.
+    pub const fn set_highest(&mut self, height_m: u16) {
+        self.highest_m = Some(height_m);
     }
 }
 

@@ -44,7 +44,7 @@ impl fmt::Display for Intrusion {
     }
 }
 
-/// `MAV_COMP_ID_USER1`: no ground station has it. Component 190 of any system may command by default.
+/// `MAV_COMP_ID_USER1`: no ground station has it.
 const USER_COMPONENT: u8 = 25;
 
 /// Where a frame enters the network.

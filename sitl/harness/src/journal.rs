@@ -87,6 +87,8 @@ pub struct Journal {
     slots: Vec<Slot>,
     frames: Vec<(Instant, Vec<u8>)>,
     next_point: Instant,
+    /// Nothing is recorded.
+    off: bool,
 }
 
 /// The clock of a log counts from 1970. A virtual flight begins on 2026-01-01, so that equal flights give equal files.
@@ -95,8 +97,17 @@ const LOG_EPOCH_S: u64 = 1_767_225_600;
 impl Journal {
     const TRACK_INTERVAL: Duration = Duration::from_millis(200);
 
+    /// A journal that records nothing.
+    pub(crate) fn off() -> Journal {
+        Journal { off: true, ..Journal::default() }
+    }
+
+    pub(crate) const fn is_off(&self) -> bool {
+        self.off
+    }
+
     pub(crate) fn track_point(&mut self, now: Instant, truth: &Truth) {
-        if now >= self.next_point {
+        if !self.off && now >= self.next_point {
             self.next_point = now + Journal::TRACK_INTERVAL;
             self.track.push(TrackPoint { at: now, position: truth.position });
         }
@@ -106,8 +117,10 @@ impl Journal {
         self.slots.push(slot);
     }
 
-    pub(crate) fn frame(&mut self, now: Instant, bytes: Vec<u8>) {
-        self.frames.push((now, bytes));
+    pub(crate) fn frame(&mut self, now: Instant, bytes: &[u8]) {
+        if !self.off {
+            self.frames.push((now, bytes.to_vec()));
+        }
     }
 
     /// Where the aircraft was, five times a second.

@@ -58,7 +58,7 @@ pub use autopilot::{
 };
 pub use city::ImportError;
 pub use companion::{Companion, Computer};
-pub use flight::{Ending, Figures, FlightError, FlightResult, FlightRun, STEP, fly};
+pub use flight::{Ending, Figures, FlightError, FlightResult, FlightRun, STEP, fly, fly_without_record};
 pub use intruder::Intrusion;
 pub use journal::{Journal, Slot, TrackPoint};
 pub use line::{Lane, LineFault};

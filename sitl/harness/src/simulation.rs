@@ -67,6 +67,12 @@ impl Simulation {
         })
     }
 
+    /// The same without a record of the flight: [`Simulation::journal`] stays empty. For flights whose end alone counts.
+    #[must_use]
+    pub fn without_record(self) -> Simulation {
+        Simulation { journal: Journal::off(), ..self }
+    }
+
     /// Advances time to `now`.
     pub fn step(&mut self, now: Instant) {
         self.now = now;
@@ -105,7 +111,7 @@ impl Simulation {
             bytes = &bytes[taken..];
             while let Some(frame) = self.tap.next_frame() {
                 let raw = relayed(&frame);
-                self.journal.frame(now, raw.clone());
+                self.journal.frame(now, &raw);
                 self.referee.sent(now, &frame);
                 self.read_companion(&frame);
                 self.line.send(now, Lane::Up, raw);
@@ -124,11 +130,11 @@ impl Simulation {
     pub fn from_ground(&mut self, mut bytes: &[u8]) {
         let now = self.now;
         let all = bytes;
-        while !bytes.is_empty() {
+        while !bytes.is_empty() && !self.journal.is_off() {
             let taken = self.ground_tap.push(bytes);
             bytes = &bytes[taken..];
             while let Some(frame) = self.ground_tap.next_frame() {
-                self.journal.frame(now, relayed(&frame));
+                self.journal.frame(now, &relayed(&frame));
             }
         }
         self.autopilot.receive(LinkId::GROUND, all);
@@ -155,7 +161,7 @@ impl Simulation {
         for frame in &frames {
             // The companion's were logged when they were sent. Byte 6 of a version 2 frame is the component.
             if frame.get(6) == Some(&1) {
-                self.journal.frame(self.now, frame.clone());
+                self.journal.frame(self.now, frame);
             }
         }
         frames
@@ -190,9 +196,12 @@ impl Simulation {
     fn decided(&mut self, record: DecisionRecord) {
         let truth = self.autopilot.truth();
         let flown = self.referee.decided(self.now, &record, &truth);
-        let heard = self.heard();
+        let heard = if self.journal.is_off() { Vec::new() } else { self.heard() };
         let serving = flown.then(|| self.modem.slot(record.cell, record.action)).flatten();
         self.deciding |= flown;
+        if self.journal.is_off() {
+            return;
+        }
         let collected = self.modem.field().collected_fraction();
         self.journal.slot(Slot {
             at: self.now,

@@ -61,7 +61,20 @@ fn finish(mut bytes: Vec<u8>, message_id: u32) -> Vec<u8> {
 /// A received frame as it was sent, without its signature: what a router passes on.
 pub(crate) fn relayed(frame: &Frame) -> Vec<u8> {
     match frame.version {
-        WireVersion::V2 => frame_v2(frame.sender, frame.sequence, frame.message_id, frame.payload()),
+        // A signature sets a flag that the checksum covers.
+        WireVersion::V2 if frame.signature.is_some() => {
+            frame_v2(frame.sender, frame.sequence, frame.message_id, frame.payload())
+        }
+        WireVersion::V2 => {
+            let (Address { system, component }, payload) = (frame.sender, frame.payload());
+            let [id0, id1, id2, _] = frame.message_id.to_le_bytes();
+            let mut bytes = Vec::with_capacity(payload.len() + 12);
+            bytes.extend_from_slice(&[0xFD, payload.len() as u8, 0, frame.compatibility, frame.sequence]);
+            bytes.extend_from_slice(&[system, component, id0, id1, id2]);
+            bytes.extend_from_slice(payload);
+            bytes.extend_from_slice(&frame.checksum.to_le_bytes());
+            bytes
+        }
         WireVersion::V1 => {
             let Address { system, component } = frame.sender;
             let length = frame.payload().len() as u8;

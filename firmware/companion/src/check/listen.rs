@@ -103,6 +103,15 @@ impl Heard {
         })
     }
 
+    /// What the autopilot does when this program dies, where the operator should change that. Its parameters are not
+    /// read: listening sends nothing.
+    pub fn dead_companion(&self) -> Option<&'static str> {
+        let (firmware, _) = self.autopilot?;
+        (firmware == Firmware::ArduPilot).then_some(
+            "not read: if this program dies, ArduPilot flies on for GUID_TIMEOUT (default 3 s): set it to 1",
+        )
+    }
+
     /// What the radio sent, or what is wrong with it and what to do. `known`: the devices of the mission.
     pub fn radio(&self, radio: &Radio, format: RadioFormat, known: &[u32]) -> Result<String, String> {
         let stats = radio.stats();

@@ -110,14 +110,14 @@ fn percent(part: BatteryUnits, whole: BatteryUnits) -> f32 {
 }
 
 fn altitude(findings: &mut Findings, mission: &Mission, parameters: &Parameters) {
-    let (altitude, tallest) = (parameters.altitude().0, mission.heights.tallest().0);
+    let (altitude, tallest) = (parameters.altitude().0, mission.heights.highest().0);
     if altitude <= tallest {
         findings.bad(
             "altitude",
-            format!("{altitude} m is not above the tallest building of {tallest} m: raise GLN_ALT"),
+            format!("{altitude} m is not above the highest roof of {tallest} m: raise GLN_ALT"),
         );
     } else {
-        findings.good("altitude", format!("{altitude} m, tallest building {tallest} m"));
+        findings.good("altitude", format!("{altitude} m, highest roof {tallest} m"));
     }
 }
 

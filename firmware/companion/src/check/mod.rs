@@ -179,6 +179,9 @@ fn check_ports(findings: &mut Findings, config: &Config, devices: &[u32], wait_s
     if let Some(advice) = heard.no_station().filter(|_| config.ground.is_empty()) {
         findings.warn("station", advice);
     }
+    if let Some(advice) = heard.dead_companion() {
+        findings.warn("GUID_TIMEOUT", advice);
+    }
     match heard.autopilot(&link) {
         Ok(name) => {
             findings.good("heartbeat", name);

@@ -9,7 +9,7 @@
 //! ground = ["udpout:192.168.1.10:14550"]      # optional: more MAVLink ports
 //! radio = "serial:/dev/ttyUSB0:115200"        # optional: reports may also arrive by TUNNEL
 //! radio_format = "cobs"                       # or "json_lines", "semtech_udp"
-//! operators = ["255", "*/190"]                # who may command: SYSTEM, SYSTEM/COMPONENT or */COMPONENT
+//! operators = ["255", "245/190"]              # who may command: SYSTEM, SYSTEM/COMPONENT or */COMPONENT
 //! log_dir = "log"                             # optional
 //! state_dir = "state"                         # optional
 //! component_id = 191                          # optional

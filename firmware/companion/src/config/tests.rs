@@ -149,3 +149,36 @@ fn operators_and_the_radio_format_are_read() {
         fault(&with("radio_format = \"nmea\"")).contains("line 1: radio_format = \"nmea\": there are cobs")
     );
 }
+
+/// The shipped file, cut, with parts repeated, left out or changed: nothing panics, and a fault is one line.
+#[test]
+fn damaged_files_are_refused_in_one_line() {
+    let valid = include_str!("../../dist/gleaner.toml").replace("\n# ", "\n");
+    // Marsaglia's xorshift: the crate has no generator.
+    let mut state = 0x9E37_79B9_u32;
+    let mut draw = |below: usize| {
+        for (left, by) in [(true, 13), (false, 17), (true, 5)] {
+            state ^= if left { state << by } else { state >> by };
+        }
+        state as usize % below
+    };
+    for _ in 0..3_000 {
+        let mut bytes = valid.clone().into_bytes();
+        for _ in 0..1 + draw(4) {
+            let at = draw(bytes.len());
+            let part = bytes[at..bytes.len().min(at + 1 + draw(40))].to_vec();
+            match draw(4) {
+                0 => bytes.truncate(at.max(1)),
+                1 => drop(bytes.splice(at..at + part.len(), [])),
+                2 => drop(bytes.splice(at..at, part)),
+                _ => bytes[at] = draw(128) as u8,
+            }
+            if bytes.is_empty() {
+                bytes.push(b'=');
+            }
+        }
+        if let Err(error) = merged(&Setup::default(), &String::from_utf8_lossy(&bytes)) {
+            assert_eq!(error.lines().count(), 1, "{error}");
+        }
+    }
+}

@@ -8,12 +8,12 @@
 //! units used = cell x cells flown + hover x nominal units hovered
 //! ```
 //!
-//! and the two prices are the least-squares solution over the last steps, with a prior that both are 1 ([`Prices`]). Where
+//! and the two prices are the least-squares solution over the last steps, at first with the nominal prices ([`Prices`]). Where
 //! the monitor counts mAh, and these agree with the percentage, each half percent of them gives such an equation instead
 //! ([`super::charge`]).
 //!
 //! The price of the last few steps is watched beside that of the last 25. When it is clearly higher, the older steps
-//! belong to another wind and are dropped.
+//! belong to another wind, and both prices count by the same factor more.
 
 use crate::flight::charge::Charge;
 use crate::flight::prices::{Flown, Prices};
@@ -25,13 +25,13 @@ pub(crate) const HOVER_UNITS_PER_S: f32 = 0.25;
 const DECAY: f32 = 0.96;
 /// The same for the last few steps: about five.
 const RECENT_DECAY: f32 = 0.8;
-/// The last steps cost more by this factor: the older ones are dropped. The time of a step is known to one report of the
-/// battery, 2 s on PX4, which makes the price of five steps uncertain by about 8 %.
+/// From this factor on the last steps are dearer. The time of a step is known to one report of the battery, 2 s on PX4, which
+/// makes the price of five steps uncertain by about 8 %.
 const DEARER: f32 = 1.15;
-/// Weight that the last steps keep then: some of them are from before the change.
-const KEPT: f32 = 0.3;
+/// The most that they may be dearer.
+const DEAREST: f32 = 3.0;
 /// Steps that must have been seen to be compared, by weight.
-const RECENT_STEPS: f32 = 2.0;
+const RECENT_STEPS: f32 = 2.8;
 /// A larger step within one report is a fault of the monitor or of a cell, not consumption.
 pub(crate) const JUMP_PERCENT: u8 = 5;
 /// A price that is learned this close to the nominal one is noise of whole percents.
@@ -156,16 +156,23 @@ impl Burn {
     fn learn(&mut self, flown: Flown, used: f32) {
         self.prices.learn(flown, used, DECAY);
         self.recent.learn(flown, used, RECENT_DECAY);
-        let recently = self.recent.flown();
-        let is_enough = recently.units() >= RECENT_STEPS;
-        if is_enough && self.recent.mean() > DEARER * self.prices.mean_of(recently) {
-            self.prices = self.recent.fraction(KEPT);
-        }
     }
 
     /// Units that a cell and a nominal unit of hovering take, as learned.
     pub(crate) fn learned(&self) -> (f32, f32) {
-        self.prices.solve()
+        let (cell, hover) = self.prices.solve();
+        let factor = self.dearer();
+        (cell * factor, hover * factor)
+    }
+
+    /// How much dearer the last few steps were than the window says: 1 if not clearly.
+    fn dearer(&self) -> f32 {
+        let recently = self.recent.flown();
+        if recently.units() < RECENT_STEPS {
+            return 1.0;
+        }
+        let factor = self.recent.mean() / self.prices.mean_of(recently);
+        if factor > DEARER { factor.min(DEAREST) } else { 1.0 }
     }
 
     /// The price of a nominal unit that the way home is judged by: never below 1. `slot_s` is the time of a slot: the
@@ -258,7 +265,7 @@ mod tests {
 
     /// Nominal consumption, then wind: many cheap steps must not outweigh few dear ones.
     #[test]
-    fn a_dearer_wind_is_learned_in_eight_percent() {
+    fn eight_percent_teach_a_dearer_wind_to_a_tenth() {
         for price in [1.4, 1.8, 2.4] {
             let mut burn = Burn::new();
             let mut left = 90.5_f32;
@@ -273,7 +280,7 @@ mod tests {
             fly(&mut burn, 0.98, 40.0);
             assert_eq!(burn.price(2.0), 1.0);
             fly(&mut burn, price, 8.0);
-            assert!(burn.price(2.0) > 0.96 * price, "{} for {price}", burn.price(2.0));
+            assert!(burn.price(2.0) > 0.9 * price, "{} for {price}", burn.price(2.0));
             fly(&mut burn, price, 20.0);
             assert!(burn.price(2.0) < 1.15 * price, "{} for {price}", burn.price(2.0));
         }

@@ -42,7 +42,7 @@ pub(crate) fn check(scene: &Scene<'_>, energy: &Energy, requested_at: Instant) -
         return Err(Missing::Radio);
     }
     let altitude = parameters.altitude();
-    if altitude.0 - ALTITUDE_TOLERANCE_M < scene.mission.heights.tallest().0 {
+    if altitude.0 - ALTITUDE_TOLERANCE_M < scene.mission.heights.highest().0 {
         return Err(Missing::SafeAltitude);
     }
     if !vehicle.armed {

@@ -10,7 +10,10 @@
 //! corner_lon_deg = 149.1652374
 //! rotation_deg = 0.0              # optional: direction of the grid's north axis, clockwise from true north
 //! cell_m = 20.0
-//! heights = "city.csv"            # building heights, one row a line from north to south
+//! heights = "city.csv"            # building heights above the ground, one row a line from north to south
+//! ground = "ground.csv"           # optional: ground heights above a common level, a table like `heights`
+//! take_off_ground_m = 12.0        # with `ground`: the ground height at the take-off point
+//! highest_m = 75                  # instead of `ground`: the highest roof or hill above the take-off point
 //!
 //! [fence]                         # optional: without it all of the grid may be flown over
 //! allowed = [[0, 0], [39, 29]]    # south-west and north-east cell of a rectangle
@@ -97,6 +100,9 @@ struct GridTable {
     rotation_deg: Option<Spanned<f32>>,
     cell_m: Spanned<f32>,
     heights: Spanned<String>,
+    ground: Option<Spanned<String>>,
+    take_off_ground_m: Option<Spanned<f32>>,
+    highest_m: Option<Spanned<u16>>,
 }
 
 #[derive(Deserialize)]
@@ -156,7 +162,7 @@ impl DeviceTable {
 /// The first fault, see [`MissionFileError`].
 pub fn read(
     text: &str,
-    city: impl FnOnce(&str) -> Result<String, String>,
+    city: impl FnMut(&str) -> Result<String, String>,
 ) -> Result<Mission, MissionFileError> {
     let file: File = toml::from_str(text).map_err(|error| {
         let line = error.span().map_or(1, |span| line_of(text, span.start));
@@ -185,9 +191,12 @@ impl Reader<'_> {
     fn mission(
         &self,
         file: File,
-        city: impl FnOnce(&str) -> Result<String, String>,
+        mut city: impl FnMut(&str) -> Result<String, String>,
     ) -> Result<Mission, MissionFileError> {
-        let heights = self.heights(&file.grid, city)?;
+        let mut heights = self.heights(&file.grid, &file.grid.heights, &mut city)?;
+        if let Some(highest_m) = self.highest_m(&file.grid, &heights, &mut city)? {
+            heights.set_highest(highest_m);
+        }
         let corner = GeoPoint {
             lat_deg_e7: self.degrees(&file.grid.corner_lat_deg, 90.0)?,
             lon_deg_e7: self.degrees(&file.grid.corner_lon_deg, 180.0)?,
@@ -255,20 +264,53 @@ impl Reader<'_> {
     fn heights(
         &self,
         grid: &GridTable,
-        city: impl FnOnce(&str) -> Result<String, String>,
+        table: &Spanned<String>,
+        city: &mut impl FnMut(&str) -> Result<String, String>,
     ) -> Result<HeightMap, MissionFileError> {
-        let path = grid.heights.get_ref().clone();
+        let path = table.get_ref().clone();
         let cell_m = *grid.cell_m.get_ref();
         if !(cell_m.is_finite() && cell_m > 0.0) {
             return Err(self.fault(&grid.cell_m, "cell_m is not a length above 0: give the side in metres"));
         }
         let csv = city(&path).map_err(|cause| MissionFileError::CityMissing {
-            line: self.line(&grid.heights),
+            line: self.line(table),
             path: path.clone(),
             cause,
         })?;
         let city = read_city(csv.as_bytes(), Metres(cell_m));
         city.map(|city| city.heights).map_err(|fault| MissionFileError::City { path, fault })
+    }
+
+    /// The highest roof or hill above the take-off point, where the ground is not flat.
+    fn highest_m(
+        &self,
+        grid: &GridTable,
+        heights: &HeightMap,
+        city: &mut impl FnMut(&str) -> Result<String, String>,
+    ) -> Result<Option<u16>, MissionFileError> {
+        let Some(table) = &grid.ground else {
+            if let Some(stray) = &grid.take_off_ground_m {
+                return Err(
+                    self.fault(stray, "take_off_ground_m without ground: name the table, or remove it")
+                );
+            }
+            return Ok(grid.highest_m.as_ref().map(|highest| *highest.get_ref()));
+        };
+        if let Some(stray) = &grid.highest_m {
+            return Err(self.fault(stray, "highest_m beside ground: remove one of them"));
+        }
+        let Some(take_off) = grid.take_off_ground_m.as_ref().filter(|value| value.get_ref().is_finite())
+        else {
+            return Err(self.fault(table, "ground without take_off_ground_m: give the ground height there"));
+        };
+        let ground = self.heights(grid, table, city)?;
+        if ground.grid() != heights.grid() {
+            return Err(self.fault(table, "ground has not as many rows and columns as heights: correct one"));
+        }
+        let tops = ground.as_slice().iter().zip(heights.as_slice());
+        let highest = tops.map(|(&ground, &roof)| u16::from(ground) + u16::from(roof)).max().unwrap_or(0);
+        // Out of range saturates; rounded up, as heights are.
+        Ok(Some(libm::ceilf(f32::from(highest) - take_off.get_ref()) as u16))
     }
 
     fn rotation(&self, grid: &GridTable) -> Result<Degrees, MissionFileError> {

@@ -8,7 +8,7 @@
 //! | 2 | version, [`VERSION`] |
 //! | 2 | length of the body |
 //! | 4 | CRC-32 (ISO-HDLC) of the version and the body (in version 2 of the body) |
-//! | body | grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); rotation, degrees clockwise from north (f32; not in version 2); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (4 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
+//! | body | in version 4: the highest roof or hill above the take-off point, m (2); grid: width, height (2 + 2), cell side m (f32); corner: latitude, longitude (1e-7 deg, 4 + 4); rotation, degrees clockwise from north (f32; not in version 2); terminal x, y (2 + 2); budget (f32); number of devices (2); per device id, x, y (4 + 2 + 2), data (f32); heights, one byte a cell in index order; fence, one bit a cell in index order, lowest bit first |
 //!
 //! Whatever follows the body is ignored, so the image may stand in a longer section of flash.
 
@@ -19,13 +19,15 @@ use gleaner_units::{
 };
 use heapless::Vec;
 
-/// The layout above.
+/// The layout above, on flat ground.
 pub const VERSION: u16 = 3;
+/// The layout of a mission that states its highest point: an older program must refuse it.
+const UNEVEN: u16 = 4;
 /// The layout without the grid's rotation, which is still read: the rotation is then 0.
 const UNROTATED: u16 = 2;
 const MAGIC: [u8; 4] = *b"GLNM";
 const HEADER_BYTES: usize = 12;
-const FIXED_BYTES: usize = 30;
+const FIXED_BYTES: usize = 32;
 const DEVICE_BYTES: usize = 12;
 /// The longest image.
 pub const IMAGE_BYTES_MAX: usize =
@@ -73,6 +75,13 @@ pub fn encode(mission: &Mission) -> ImageBytes {
     let mut put = |bytes: &[u8]| {
         let _ = body.extend_from_slice(bytes);
     };
+    let version = match mission.heights.stated_highest_m() {
+        Some(highest_m) => {
+            put(&highest_m.to_le_bytes());
+            UNEVEN
+        }
+        None => VERSION,
+    };
     let grid = mission.grid();
     put(&grid.width().to_le_bytes());
     put(&grid.height().to_le_bytes());
@@ -102,9 +111,9 @@ pub fn encode(mission: &Mission) -> ImageBytes {
     let mut image = ImageBytes::new();
     let header: [&[u8]; 4] = [
         &MAGIC,
-        &VERSION.to_le_bytes(),
+        &version.to_le_bytes(),
         &(body.len() as u16).to_le_bytes(),
-        &checksum(VERSION, &body).to_le_bytes(),
+        &checksum(version, &body).to_le_bytes(),
     ];
     for part in header.into_iter().chain([body.as_slice()]) {
         let _ = image.extend_from_slice(part);
@@ -122,7 +131,7 @@ pub fn decode(bytes: &[u8]) -> Result<Mission, ImageError> {
         return Err(ImageError::Absent);
     }
     let version = header.u16()?;
-    if ![UNROTATED, VERSION].contains(&version) {
+    if ![UNROTATED, VERSION, UNEVEN].contains(&version) {
         return Err(ImageError::Version(version));
     }
     let length = usize::from(header.u16()?);
@@ -179,6 +188,7 @@ impl<'b> Reader<'b> {
     }
 
     fn mission(mut self, version: u16) -> Result<Mission, ImageError> {
+        let highest_m = if version == UNEVEN { Some(self.u16()?) } else { None };
         let (width, height, cell_m) = (self.u16()?, self.u16()?, self.f32()?);
         let grid = Grid::new(width, height, Metres(cell_m)).map_err(|_| ImageError::Value)?;
         let mut mission = Mission {
@@ -196,6 +206,9 @@ impl<'b> Reader<'b> {
             let site =
                 DeviceSite { id: u32::from_le_bytes(self.array()?), cell: self.cell()?, data: self.f32()? };
             mission.devices.push(site).map_err(|_| ImageError::Value)?;
+        }
+        if let Some(highest_m) = highest_m {
+            mission.heights.set_highest(highest_m);
         }
         for (cell, &height_m) in grid.cells().zip(self.slice(grid.len())?) {
             mission.heights.set(cell, height_m);
@@ -257,7 +270,11 @@ mod tests {
             let _ = image.push(0xFF);
             assert_eq!(decode(&image), Ok(mission), "what follows is ignored");
         }
-        assert_eq!(encode(&mission(128, 128, 64)).len(), IMAGE_BYTES_MAX);
+        let mut uneven = mission(128, 128, 64);
+        uneven.heights.set_highest(83);
+        let image = encode(&uneven);
+        assert_eq!((image[4], image.len()), (4, IMAGE_BYTES_MAX));
+        assert_eq!(decode(&image), Ok(uneven));
     }
 
     #[test]

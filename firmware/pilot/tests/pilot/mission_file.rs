@@ -52,6 +52,29 @@ fn a_mission_survives_writing_and_reading() {
     assert_eq!(read(&text, city).unwrap(), mission, "{text}");
 }
 
+/// Buildings of up to 30 m, on ground that rises by 50 m to the west.
+#[test]
+fn uneven_ground_raises_the_highest_roof() {
+    let tables = |path: &str| match path {
+        "ground.csv" => Ok("60,50,20,10\n50,40,20,10\n".into()),
+        _ => city(path),
+    };
+    let with = |keys: &str| TEXT.replace("cell_m =", &format!("{keys}\ncell_m ="));
+    let ground = "ground = \"ground.csv\"\ntake_off_ground_m";
+    let mission = read(&with(&format!("{ground} = 9.5")), tables).unwrap();
+    assert_eq!(mission.heights.highest().0, 51.0, "60 m, less 9.5 m, rounded up");
+    assert_eq!(mission.heights.tallest().0, 30.0);
+    let text = write(&mission, "city.csv");
+    assert_eq!(read(&text, city).unwrap(), mission, "{text}");
+    assert_eq!(read(&with("highest_m = 51"), city).unwrap(), mission);
+    assert_eq!(read(TEXT, city).unwrap().heights.highest().0, 30.0);
+    let fault = |keys: &str| read(&with(keys), tables).unwrap_err().to_string();
+    assert!(fault("ground = \"ground.csv\"").contains("ground without take_off_ground_m"));
+    assert!(fault("take_off_ground_m = 1.0").contains("take_off_ground_m without ground"));
+    assert!(fault(&format!("{ground} = 1.0\nhighest_m = 4")).contains("highest_m beside ground"));
+    assert!(fault(&format!("{ground} = nan")).contains("ground without take_off_ground_m"));
+}
+
 #[test]
 fn rotated_grids_survive_writing_and_place_devices() {
     let rotated = |degrees: &str| TEXT.replace("cell_m =", &format!("rotation_deg = {degrees}\ncell_m ="));

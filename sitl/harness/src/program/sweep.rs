@@ -4,7 +4,7 @@ use super::arguments::SweepOrder;
 use super::results;
 use super::shrink::{self, Failure};
 use super::{ProgramError, model};
-use crate::{AutopilotKind, Ending, FlightError, FlightResult, MissionSetup, Trial};
+use crate::{AutopilotKind, Ending, FlightError, FlightResult, FlightScript, MissionSetup, Trial};
 use gleaner_pilot::{Budget, LookingAhead};
 use gleaner_policy::Engine;
 use gleaner_world::World;
@@ -140,16 +140,16 @@ fn judge(
     if let Some(kept) = &order.incidents {
         trial = trial.with_incidents(kept);
     }
-    let mut fly = |trial: &Trial| -> Result<FlightResult, ProgramError> {
+    let mut fly = |trial: &Trial, keep: bool| -> Result<FlightResult, ProgramError> {
         let setup = MissionSetup::new(Arc::clone(world), trial.plan).map_err(FlightError::from)?;
-        let script = trial.script.clone();
-        Ok(match order.lookahead {
-            true => crate::fly(setup, script, LookingAhead::new(&mut *policy, Budget::LINUX), Ok(())),
-            false => crate::fly(setup, script, &mut *policy, Ok(())),
-        }?)
+        fly(order, number, (setup, trial.script.clone()), policy, keep)
     };
-    let result = fly(&trial)?;
+    let mut result = fly(&trial, order.keep)?;
     let faults = faults(&result);
+    if !faults.is_empty() && !order.keep {
+        // The same flight, for its files.
+        result = fly(&trial, true)?;
+    }
     let row = Row::of(&result, !faults.is_empty());
     let class = trial.class();
     if order.keep || !faults.is_empty() {
@@ -161,7 +161,7 @@ fn judge(
     }
     let kept = match order.incidents {
         Some(_) => None,
-        None => shrink::smallest(&trial, |trial| Ok::<_, ProgramError>(failure(&fly(trial)?)))?,
+        None => shrink::smallest(&trial, |trial| Ok::<_, ProgramError>(failure(&fly(trial, false)?)))?,
     };
     let finding = Finding {
         flight: number,
@@ -183,6 +183,28 @@ fn judge(
         smaller: kept.map(|kept| order.replay(number, Some(&kept))),
     };
     Ok(Judged { number, class, row, finding: Some(finding) })
+}
+
+/// Each flight of this many looks ahead with the effort of a companion computer, whatever is set.
+const FULL_EFFORT: u64 = 100;
+
+/// Flies with the effort of the order, and with the record of the flight if it is to be kept.
+fn fly(
+    order: &SweepOrder,
+    number: u64,
+    (setup, script): (MissionSetup, FlightScript),
+    policy: &mut Engine,
+    keep: bool,
+) -> Result<FlightResult, ProgramError> {
+    let budget =
+        if number.is_multiple_of(FULL_EFFORT) { Budget::LINUX } else { Budget { tours: order.tours } };
+    let ahead = |policy| LookingAhead::new(policy, budget);
+    Ok(match (order.lookahead, keep) {
+        (true, true) => crate::fly(setup, script, ahead(policy), Ok(())),
+        (true, false) => crate::fly_without_record(setup, script, ahead(policy), Ok(())),
+        (false, true) => crate::fly(setup, script, policy, Ok(())),
+        (false, false) => crate::fly_without_record(setup, script, policy, Ok(())),
+    }?)
 }
 
 /// The kind of failure, to compare flights with.
@@ -278,7 +300,7 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AircraftFault, FlightScript, Incident, IncidentKind, MissionPlan};
+    use crate::{AircraftFault, Incident, IncidentKind, MissionPlan};
     use gleaner_policy::{Attention, Inference, Policy, Tokens};
     use gleaner_units::{BatteryUnits, Duration};
     use gleaner_world::ScenarioKind;

@@ -39,6 +39,8 @@ pub struct Referee {
     leads_to: Option<Cell>,
     /// Whether the pilot's decisions are being flown.
     flying: bool,
+    /// Whether the autopilot lands or returns by the pilot's request: GUIDED after that is somebody else's.
+    ends: bool,
     /// Injected errors of the position, during which place is not judged.
     disturbed_until: Instant,
     off_altitude_since: Option<Instant>,
@@ -92,6 +94,7 @@ impl Referee {
             expected: None,
             leads_to: None,
             flying: false,
+            ends: false,
             disturbed_until: Instant::ZERO,
             off_altitude_since: None,
             excursions: Excursions::default(),
@@ -179,7 +182,7 @@ impl Referee {
         if !self.flying {
             self.could_return = self.covers_return(truth);
         }
-        self.flying = true;
+        (self.flying, self.ends) = (true, false);
         self.decisions += 1;
         self.judge_place(now, record, truth);
         self.judge_action(now, record);
@@ -218,7 +221,8 @@ impl Referee {
     pub fn watch(&mut self, now: Instant, truth: &Truth) {
         self.custody.watch(now, truth);
         let airborne = !truth.on_ground;
-        self.flying &= self.flies(truth);
+        let flies = self.flies(truth);
+        self.flying &= flies;
         if self.flying && airborne && truth.mode == VehicleMode::Guided && now >= self.disturbed_until {
             self.watch_place(now, truth);
         }
@@ -238,10 +242,13 @@ impl Referee {
     }
 
     /// Whether the aircraft follows the pilot: GUIDED, or the LAND or RTL that the pilot requested.
-    fn flies(&self, truth: &Truth) -> bool {
+    fn flies(&mut self, truth: &Truth) -> bool {
         match truth.mode {
-            VehicleMode::Guided => !self.custody.is_revoked(),
-            VehicleMode::Land | VehicleMode::Return => truth.mode_by == Commander::Companion,
+            VehicleMode::Guided => !self.ends && !self.custody.is_revoked(),
+            VehicleMode::Land | VehicleMode::Return => {
+                self.ends = truth.mode_by == Commander::Companion;
+                self.ends
+            }
             _ => false,
         }
     }

@@ -289,3 +289,17 @@ fn a_forbidden_cell_may_be_entered_by_an_overshoot_only() {
         assert_eq!(stand.rules().contains(&rule), broken, "{east_m} m");
     }
 }
+
+#[test]
+fn guided_during_the_pilots_landing_is_somebody_elses() {
+    let mut stand = Stand::engaged(AutopilotKind::ArduPilot);
+    stand.referee.flying = true;
+    let guided = over(&stand, Cell::new(10, 6), 0.0);
+    let landing = Truth { mode: VehicleMode::Land, mode_by: Commander::Companion, height_m: 30.0, ..guided };
+    stand.referee.watch(at(20_000), &landing);
+    // The altitude would be judged after 10 s.
+    for second in 21..40 {
+        stand.referee.watch(at(second * 1_000), &Truth { height_m: 4.0, ..guided });
+    }
+    assert_eq!(stand.rules(), []);
+}

@@ -28,6 +28,8 @@ struct GridOut<'m> {
     rotation_deg: f32,
     cell_m: f32,
     heights: &'m str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    highest_m: Option<u16>,
 }
 
 // The signature that serde requires.
@@ -64,6 +66,7 @@ pub fn write(mission: &Mission, heights: &str) -> String {
             rotation_deg: mission.pose.rotation.0,
             cell_m: mission.grid().cell().0,
             heights,
+            highest_m: mission.heights.stated_highest_m(),
         },
         fence: (!excluded.is_empty()).then_some(FenceOut { excluded }),
         device: mission

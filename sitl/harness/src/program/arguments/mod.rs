@@ -6,8 +6,8 @@ mod order;
 mod values;
 
 pub(crate) use order::{
-    BoardOrder, CityOrder, FlyOrder, ImportOrder, MissionOrder, RadioFormat, RadioOrder, ServeOrder,
-    SweepOrder, Task,
+    BoardOrder, CityOrder, FlyOrder, ImportOrder, MissionOrder, RadioFormat, RadioOrder, SWEEP_TOURS,
+    ServeOrder, SweepOrder, Task,
 };
 
 use crate::{AutopilotKind, EnergyModel, MissionPlan, Switch};
@@ -78,6 +78,10 @@ struct SweepArguments {
     /// 1: the pilot looks ahead in its model of the mission (GLN_LOOKAHEAD); 0: the network alone decides.
     #[arg(long, value_name = "0|1", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=1))]
     lookahead: u8,
+    /// Tours that the look-ahead flies for each decision; a companion computer flies 1000. Faults, authority and energy do
+    /// not depend on them, the time of a sweep does. Each hundredth flight has 1000 whatever is set.
+    #[arg(long, value_name = "NUMBER", default_value_t = SWEEP_TOURS, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    tours: u32,
     /// Print one JSON object instead of a table.
     #[arg(long)]
     json: bool,
@@ -330,6 +334,7 @@ impl SweepArguments {
             model: self.model,
             engine: self.engine,
             lookahead: self.lookahead == 1,
+            tours: self.tours,
             json: self.json,
             table: self.table,
             out: self.out,

@@ -81,11 +81,16 @@ pub(crate) struct SweepOrder {
     pub engine: EngineKind,
     /// Whether the pilot looks ahead.
     pub lookahead: bool,
+    /// Tours per decision.
+    pub tours: u32,
     pub json: bool,
     pub table: Option<PathBuf>,
     pub out: PathBuf,
     pub keep: bool,
 }
+
+/// Tours per decision in a sweep.
+pub(crate) const SWEEP_TOURS: u32 = 40;
 
 impl SweepOrder {
     /// The command that repeats one flight, with only some of its incidents where they are given.
@@ -110,6 +115,9 @@ impl SweepOrder {
         }
         if !self.lookahead {
             command.push_str(" --lookahead 0");
+        }
+        if self.tours != SWEEP_TOURS {
+            let _ = write!(command, " --tours {}", self.tours);
         }
         command
     }
