@@ -24,7 +24,8 @@
 //! The theorem is about cells and a battery level in units. It assumes:
 //! - **Unit price.** A move takes at most one unit and a hover at most half of one. The pilot learns the real prices from the
 //!   measured charge and offers the guard the charge divided by the higher one, with a margin of 5 %. Until the battery has
-//!   shown a few percent of use, the nominal price holds.
+//!   shown a few percent of use, the nominal price holds, and in slots of more than 4 s (`GLN_SPEED` below 5 m/s in cells of
+//!   20 m) the price of hovering for so long.
 //! - **Wind.** A price learned on the way out is assumed on the way home. A headwind that begins later, or on one course only,
 //!   is not covered until it is learned; `GLN_RESERVE` is for that.
 //! - **Landing.** Descent and landing at the terminal are taken off the charge before it is offered, from the altitude and
