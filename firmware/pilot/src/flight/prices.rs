@@ -60,7 +60,7 @@ impl Prices {
         let (cu, hu) = (cu + PRIOR * self.unflown_cell(), hu + PRIOR);
         let determinant = cc * hh - ch * ch;
         let solved = ((cu * hh - hu * ch) / determinant, (hu * cc - cu * ch) / determinant);
-        let sound = |price: f32| if price.is_finite() { price.max(CHEAPEST).min(DEAREST) } else { 1.0 };
+        let sound = |price: f32| if price.is_finite() { price.clamp(CHEAPEST, DEAREST) } else { 1.0 };
         (sound(solved.0), sound(solved.1))
     }
 
