@@ -58,10 +58,11 @@ pub struct Computer<P> {
     mission: Mission,
     settings: Settings,
     self_test: Result<(), SelfTestError>,
-    /// `None` while the program is not running.
-    onboard: Option<Onboard<P>>,
+    /// `None` while the program is not running. On the heap: with look-ahead over 128 x 128 cells a pilot has 200 kB,
+    /// and each move of it would take that from the stack.
+    onboard: Option<Box<Onboard<P>>>,
     /// The policy while the program is not running.
-    policy: Option<P>,
+    policy: Option<Box<P>>,
     parameters: Parameters,
     stalled_until: Instant,
     starts_at: Instant,
@@ -86,7 +87,7 @@ impl<P: Deliberator> Computer<P> {
             settings,
             self_test,
             onboard: None,
-            policy: Some(policy),
+            policy: Some(Box::new(policy)),
             parameters: parameters(P::LOOKS_AHEAD),
             stalled_until: Instant::ZERO,
             starts_at: Instant::ZERO,
@@ -100,14 +101,15 @@ impl<P: Deliberator> Computer<P> {
     fn start(&mut self) -> Result<(), OnboardError> {
         let Some(policy) = self.policy.take() else { return Ok(()) };
         let (mission, parameters) = (self.mission.clone(), self.parameters.clone());
-        self.onboard = Some(Onboard::new(mission, parameters, self.settings, policy, self.self_test)?);
+        let onboard = Onboard::new(mission, parameters, self.settings, *policy, self.self_test)?;
+        self.onboard = Some(Box::new(onboard));
         Ok(())
     }
 
     /// The pilot's state; `None` while the program is not running.
     #[must_use]
     pub fn state(&self) -> Option<State> {
-        self.onboard.as_ref().map(Onboard::state)
+        self.onboard.as_ref().map(|onboard| onboard.state())
     }
 
     fn keep(&mut self, now: Instant, frames: Vec<Vec<u8>>) {
@@ -162,7 +164,7 @@ impl<P: Deliberator> Companion for Computer<P> {
             ComputerFault::Restart(after) => {
                 if let Some(onboard) = self.onboard.take() {
                     self.parameters = onboard.parameters().clone();
-                    self.policy = Some(onboard.into_policy());
+                    self.policy = Some(Box::new(onboard.into_policy()));
                 }
                 self.waiting.clear();
                 self.waiting_bytes = 0;

@@ -1,11 +1,11 @@
 //! Least squares of two prices: of a cell, and of a nominal unit of hovering.
 
-/// Weight of the prior, in equations.
+/// Weight of the prior, in nominal units.
 const PRIOR: f32 = 1.0;
 /// Share of cells below which a window counts as hovering only.
 const HOVERING: f32 = 0.1;
-/// Price of a nominal unit of cells per one of hovering: at 10 m/s the drag adds about half of the hovering power.
-const CELL_TO_HOVER: f32 = 1.5;
+/// What a headwind adds to the price of a cell, per what it adds to that of a nominal unit of hovering.
+const CELL_TO_HOVER: f32 = 2.0;
 /// Bounds of a price: beyond them the monitor is at fault, not the wind.
 const CHEAPEST: f32 = 0.3;
 const DEAREST: f32 = 3.0;
@@ -27,8 +27,9 @@ impl Flown {
 
 /// Sums over the equations `used = cell x cells + hover x hover`, older ones with less weight.
 ///
-/// Each equation is divided by the units flown: it then has the mean price of its interval on the left. A step of the
-/// percentage spans many cheap units or few dear ones; undivided, the squares of the cheap ones would prevail.
+/// Each equation has the weight `1 / units flown`, so that the mean price is the sum of what was used by the sum of what was
+/// flown. With equal weights a step of the percentage that spans many cheap units would prevail over one of few dear units; with
+/// the mean price of each step, one in which the aircraft brakes and hardly advances would.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Prices {
     /// Normal equations: cells x cells, cells x hover, hover x hover, cells x used, hover x used.
@@ -49,7 +50,7 @@ impl Prices {
         let Flown { cells, hover } = flown;
         let terms = [cells * cells, cells * hover, hover * hover, cells * used, hover * used];
         for (sum, term) in self.sums.iter_mut().zip(terms) {
-            *sum = *sum * decay + term / (units * units);
+            *sum = *sum * decay + term / units;
         }
     }
 
@@ -64,10 +65,12 @@ impl Prices {
         (sound(solved.0), sound(solved.1))
     }
 
-    /// The price of a cell as far as the equations do not say: nominal, and above hovering where nearly only that was flown.
+    /// The price of a cell as far as the equations do not say: nominal. Where nearly only hovering was flown, and that is
+    /// dearer than nominal, a cell is dearer too.
     fn unflown_cell(&self) -> f32 {
         let flown = self.flown();
-        if flown.cells < HOVERING * flown.units() { (CELL_TO_HOVER * self.mean()).max(1.0) } else { 1.0 }
+        let is_hovering = flown.cells < HOVERING * flown.units();
+        if is_hovering { 1.0 + CELL_TO_HOVER * (self.mean() - 1.0).max(0.0) } else { 1.0 }
     }
 
     /// The mean price of `flown`.
@@ -76,7 +79,7 @@ impl Prices {
         (cell * flown.cells + hover * flown.hover) / flown.units()
     }
 
-    /// Cells and hovering in the equations, by weight; together they are the number of equations.
+    /// Cells and hovering in the equations, in nominal units.
     pub(crate) fn flown(&self) -> Flown {
         let [cc, ch, hh, ..] = self.sums;
         Flown { cells: cc + ch, hover: hh + ch }
@@ -84,8 +87,8 @@ impl Prices {
 
     /// The mean price in the equations; 1 before there is one.
     pub(crate) fn mean(&self) -> f32 {
-        let ([.., cu, hu], equations) = (self.sums, self.flown().units());
-        if equations > 0.0 { (cu + hu) / equations } else { 1.0 }
+        let ([.., cu, hu], units) = (self.sums, self.flown().units());
+        if units > 0.0 { (cu + hu) / units } else { 1.0 }
     }
 
     pub(crate) fn has_learned(&self) -> bool {
@@ -106,7 +109,7 @@ mod tests {
         let (cell, hover) = prices.solve();
         assert!((cell - 1.6).abs() < 0.08 && (hover - 0.8).abs() < 0.08, "{cell} {hover}");
         let flown = prices.flown();
-        assert!((flown.units() - 40.0).abs() < 0.01, "{flown:?}");
+        assert!((flown.units() - 39.0).abs() < 0.01, "{flown:?}");
         assert!((prices.mean() - prices.mean_of(flown)).abs() < 0.02);
     }
 
@@ -115,7 +118,23 @@ mod tests {
         let mut prices = Prices::new();
         (0..25).for_each(|_| prices.learn(Flown { cells: 0.0, hover: 1.0 }, 1.6, 1.0));
         let (cell, hover) = prices.solve();
-        assert!((cell - 2.4).abs() < 0.01 && (hover - 1.6).abs() < 0.05, "{cell} {hover}");
+        assert!((cell - 2.2).abs() < 0.01 && (hover - 1.6).abs() < 0.05, "{cell} {hover}");
+    }
+
+    #[test]
+    fn nominal_hovering_leaves_cells_nominal() {
+        let mut prices = Prices::new();
+        (0..25).for_each(|_| prices.learn(Flown { cells: 0.0, hover: 1.0 }, 0.98, 1.0));
+        let (cell, hover) = prices.solve();
+        assert!((cell - 1.0).abs() < 0.01 && (hover - 0.98).abs() < 0.01, "{cell} {hover}");
+    }
+
+    #[test]
+    fn a_step_without_advance_is_no_dear_wind() {
+        let mut prices = Prices::new();
+        (0..5).for_each(|_| prices.learn(Flown { cells: 0.7, hover: 0.0 }, 0.7, 0.8));
+        prices.learn(Flown { cells: 0.06, hover: 0.0 }, 0.7, 0.8);
+        assert!(prices.mean() < 1.4, "{}", prices.mean());
     }
 
     #[test]

@@ -159,8 +159,14 @@ impl Explorer {
     }
 }
 
+/// Each step of the search holds a copy of the machine with its grid.
 #[test]
 fn the_rules_of_authority_hold_on_every_path() {
+    let search = std::thread::Builder::new().stack_size(64 << 20).spawn(search_every_path).unwrap();
+    search.join().unwrap();
+}
+
+fn search_every_path() {
     for firmware in [Firmware::ArduPilot, Firmware::Px4] {
         for engaged in [false, true] {
             let mut rig = Rig::new();

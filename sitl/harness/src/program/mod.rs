@@ -43,6 +43,9 @@ pub enum ProgramError {
         /// Why.
         source: gleaner_policy::onnx::ModelError,
     },
+    /// No thread to fly on.
+    #[error("no thread can be started: {0}: give fewer with --jobs")]
+    Thread(io::Error),
     /// The mission cannot be flown.
     #[error("{0}")]
     Flight(#[from] crate::FlightError),

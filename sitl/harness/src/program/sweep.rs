@@ -93,6 +93,9 @@ pub(super) fn sweep(order: &SweepOrder) -> Result<bool, ProgramError> {
     Ok(report.findings.is_empty())
 }
 
+/// A pilot for the largest grid is moved through several frames of a stack: 2 MB, the default, do not suffice.
+const STACK_BYTES: usize = 32 << 20;
+
 /// Flies on all cores; a flight is the same on any number of them.
 fn fly_all(order: &SweepOrder) -> Result<Vec<Judged>, ProgramError> {
     let world = Arc::new(World::default_world());
@@ -120,7 +123,8 @@ fn fly_all(order: &SweepOrder) -> Result<Vec<Judged>, ProgramError> {
     };
     let workers = order.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
     let judged = thread::scope(|scope| {
-        let workers: Vec<_> = (0..workers).map(|_| scope.spawn(worker)).collect();
+        let start = |_| thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, &worker);
+        let workers = (0..workers).map(start).collect::<Result<Vec<_>, _>>().map_err(ProgramError::Thread)?;
         let results = workers
             .into_iter()
             .map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
