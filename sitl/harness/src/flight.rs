@@ -240,7 +240,7 @@ pub fn fly<P: Deliberator>(
     Ok(run(flight, &mut computer))
 }
 
-/// The same flight without its record: a quarter faster. Everything but [`Simulation::journal`] is equal.
+/// The same flight without its record, for sweeps. Everything but [`Simulation::journal`] is equal.
 ///
 /// # Errors
 /// See [`FlightError`].

@@ -165,6 +165,12 @@ impl Burn {
         (cell * factor, hover * factor)
     }
 
+    /// The price of a nominal unit of hovering that a landing is judged by. What hovering took may be known only from before
+    /// a change that cells showed since, so it is at least the mean of the window.
+    pub(crate) fn descent_price(&self) -> f32 {
+        self.learned().1.max(self.prices.mean()).max(1.0)
+    }
+
     /// How much dearer the last few steps were than the window says: 1 if not clearly.
     fn dearer(&self) -> f32 {
         let recently = self.recent.flown();
@@ -284,6 +290,20 @@ mod tests {
             fly(&mut burn, price, 20.0);
             assert!(burn.price(2.0) < 1.15 * price, "{} for {price}", burn.price(2.0));
         }
+    }
+
+    #[test]
+    fn cells_that_grow_dear_make_the_landing_dearer() {
+        let mut burn = fly(1.0, 0.5, 20);
+        assert!(burn.descent_price() < 1.1, "{}", burn.descent_price());
+        let mut left = 60.5_f32;
+        burn.interrupt();
+        while left > 30.0 {
+            burn.flew(0.05);
+            left -= 0.05 * 1.8;
+            burn.read(left as u8, None, FULL);
+        }
+        assert!(burn.descent_price() > 1.6, "{}", burn.descent_price());
     }
 
     #[test]

