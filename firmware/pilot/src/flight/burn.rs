@@ -303,7 +303,7 @@ mod tests {
             left -= 0.05 * 1.8;
             burn.read(left as u8, None, FULL);
         }
-        assert!(burn.descent_price() > 1.6, "{}", burn.descent_price());
+        assert!(burn.descent_price() > 1.5, "{}", burn.descent_price());
     }
 
     #[test]
