@@ -123,7 +123,7 @@ fn fly_all(order: &SweepOrder) -> Result<Vec<Judged>, ProgramError> {
     };
     let workers = order.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
     let judged = thread::scope(|scope| {
-        let start = |_| thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, &worker);
+        let start = |_| thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, worker);
         let workers = (0..workers).map(start).collect::<Result<Vec<_>, _>>().map_err(ProgramError::Thread)?;
         let results = workers
             .into_iter()
