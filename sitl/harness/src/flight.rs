@@ -157,8 +157,7 @@ impl FlightRun {
     }
 
     /// The same without a record of the flight.
-    #[must_use]
-    pub fn without_record(self) -> FlightRun {
+    fn without_record(self) -> FlightRun {
         FlightRun { simulation: self.simulation.without_record(), ..self }
     }
 
@@ -235,9 +234,8 @@ pub fn fly<P: Deliberator>(
     policy: P,
     self_test: Result<(), SelfTestError>,
 ) -> Result<FlightResult, FlightError> {
-    let mut computer = computer(&setup, policy, self_test)?;
-    let flight = FlightRun::new(setup, script, Settings::default().component_id)?;
-    Ok(run(flight, &mut computer))
+    let (flight, computer) = begin(setup, script, policy, self_test)?;
+    Ok(run(flight, computer))
 }
 
 /// The same flight without its record, for sweeps. Everything but [`Simulation::journal`] is equal.
@@ -250,23 +248,25 @@ pub fn fly_without_record<P: Deliberator>(
     policy: P,
     self_test: Result<(), SelfTestError>,
 ) -> Result<FlightResult, FlightError> {
-    let mut computer = computer(&setup, policy, self_test)?;
-    let flight = FlightRun::new(setup, script, Settings::default().component_id)?;
-    Ok(run(flight.without_record(), &mut computer))
+    let (flight, computer) = begin(setup, script, policy, self_test)?;
+    Ok(run(flight.without_record(), computer))
 }
 
-fn computer<P: Deliberator>(
-    setup: &MissionSetup,
+fn begin<P: Deliberator>(
+    setup: MissionSetup,
+    script: FlightScript,
     policy: P,
     self_test: Result<(), SelfTestError>,
-) -> Result<Computer<P>, FlightError> {
-    let computer = Computer::new(setup.mission.clone(), Settings::default(), policy, self_test);
-    computer.map_err(FlightError::Onboard)
+) -> Result<(FlightRun, Computer<P>), FlightError> {
+    let settings = Settings::default();
+    let computer = Computer::new(setup.mission.clone(), settings, policy, self_test);
+    let computer = computer.map_err(FlightError::Onboard)?;
+    Ok((FlightRun::new(setup, script, settings.component_id)?, computer))
 }
 
-fn run<P: Deliberator>(mut flight: FlightRun, computer: &mut Computer<P>) -> FlightResult {
+fn run<P: Deliberator>(mut flight: FlightRun, mut computer: Computer<P>) -> FlightResult {
     loop {
-        if let Some(ending) = flight.step(computer) {
+        if let Some(ending) = flight.step(&mut computer) {
             let state = computer.state();
             return flight.end(ending, state);
         }

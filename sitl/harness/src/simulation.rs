@@ -68,8 +68,7 @@ impl Simulation {
     }
 
     /// The same without a record of the flight: [`Simulation::journal`] stays empty. For flights whose end alone counts.
-    #[must_use]
-    pub fn without_record(self) -> Simulation {
+    pub(crate) fn without_record(self) -> Simulation {
         Simulation { journal: Journal::off(), ..self }
     }
 

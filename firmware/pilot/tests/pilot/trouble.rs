@@ -188,9 +188,8 @@ fn an_unanswered_landing_is_asked_again_and_then_handed_back() {
     assert!(rig.commanded(AutopilotCommand::ReturnToLaunch) > 0);
 }
 
-/// ArduPilot stops elsewhere when the line is cut, and would land there when the line is back.
-#[test]
-fn a_landing_is_requested_over_its_cell_only() {
+/// The landing is requested and not answered; the aircraft leaves the cell and does not come back.
+fn pushed_off_its_landing() -> Rig {
     let mut rig = Rig::new();
     rig.place(TERMINAL, 0.0);
     rig.engage();
@@ -201,6 +200,13 @@ fn a_landing_is_requested_over_its_cell_only() {
     }
     rig.obeys = false;
     rig.place(TERMINAL, -11.0);
+    rig
+}
+
+/// ArduPilot stops elsewhere when the line is cut, and would land there when the line is back.
+#[test]
+fn a_landing_is_requested_over_its_cell_only() {
+    let mut rig = pushed_off_its_landing();
     assert!(rig.step().withdraw, "what the link repeats is withdrawn");
     rig.run(10.0);
     assert_eq!((rig.commanded(AutopilotCommand::Land), rig.state()), (1, State::Homing));
@@ -212,16 +218,7 @@ fn a_landing_is_requested_over_its_cell_only() {
 
 #[test]
 fn an_aircraft_that_does_not_come_back_to_land_is_handed_back() {
-    let mut rig = Rig::new();
-    rig.place(TERMINAL, 0.0);
-    rig.engage();
-    rig.policy.actions = [South, North].into();
-    rig.accepts = None;
-    while rig.commanded(AutopilotCommand::Land) == 0 {
-        rig.step();
-    }
-    rig.obeys = false;
-    rig.place(TERMINAL, -11.0);
+    let mut rig = pushed_off_its_landing();
     rig.run(45.0);
     assert_eq!(rig.machine.fault(), Some(Fault::LandingRefused));
 }
