@@ -26,8 +26,9 @@
 //!   measured charge and offers the guard the charge divided by the higher one, with a margin of 5 %. Until the battery has
 //!   shown a few percent of use, the nominal price holds, and in slots of more than 4 s (`GLN_SPEED` below 5 m/s in cells of
 //!   20 m) the price of hovering for so long.
-//! - **Wind.** A price learned on the way out is assumed on the way home. A headwind that begins later, or on one course only,
-//!   is not covered until it is learned; `GLN_RESERVE` is for that.
+//! - **Wind.** The pilot learns from the courses flown what a headwind adds on the way home, and takes it off the charge before it
+//!   is offered. A wind that begins later, or that was met on one course only, is not covered until it is learned;
+//!   `GLN_RESERVE` is for that.
 //! - **Landing.** Descent and landing at the terminal are taken off the charge before it is offered, from the altitude and
 //!   the autopilot's descent rate. After a fault the autopilot returns to where it took off, which is not budgeted.
 //! - **Place.** The aircraft is in the given cell, or on a decided move into it whose unit is taken off.

@@ -85,4 +85,17 @@ impl<'a> Scene<'a> {
         let cell = frame.cell(&position)?;
         Some((cell, position.horizontal_distance(&frame.centre(cell, position.down_m)).0))
     }
+
+    /// The cell under the aircraft, and the displacement from the aircraft to the terminal's centre towards north and east, in
+    /// cells.
+    pub(crate) fn homeward(&self) -> Option<(Cell, [f32; 2])> {
+        let vehicle = self.vehicle();
+        let grid = self.mission.grid();
+        let frame = GridFrame::new(grid, self.mission.pose, vehicle.origin?);
+        let position = vehicle.position?;
+        let home = frame.centre(self.mission.terminal, position.down_m);
+        let to_cells = |from_m: f32, to_m: f32| (to_m - from_m) / grid.cell().0;
+        let net = [to_cells(position.north_m, home.north_m), to_cells(position.east_m, home.east_m)];
+        Some((frame.cell(&position)?, net))
+    }
 }

@@ -3,7 +3,7 @@
 use crate::autopilot::{AircraftFault, Autopilot, LinkId, Truth, VehicleMode};
 use crate::intruder::{Entry, Intruder};
 use crate::journal::{Journal, Slot};
-use crate::line::{Lane, Line};
+use crate::line::{Lane, Line, LineFault};
 use crate::modem::Modem;
 use crate::radio_fault::RadioFaults;
 use crate::referee::Referee;
@@ -20,6 +20,9 @@ use mavlink::dialects::ardupilotmega::PARAM_VALUE_DATA;
 
 /// The time that the pilot and the aircraft may take to settle after an injected position error.
 const SETTLING: Duration = Duration::from_secs(20);
+
+/// The most by which a delay makes a damaged frame late.
+const LATE: Duration = Duration::from_secs(1);
 
 /// The world around one pilot.
 #[derive(Debug)]
@@ -233,7 +236,12 @@ impl Simulation {
                 self.prepare_referee(fault);
                 self.autopilot.inject(fault);
             }
-            IncidentKind::Line(fault, lasts) => self.line.fail(now, fault, lasts),
+            IncidentKind::Line(fault, lasts) => {
+                if matches!(fault, LineFault::Noise(_)) {
+                    self.referee.noisy_until(now + lasts + LATE);
+                }
+                self.line.fail(now, fault, lasts);
+            }
             IncidentKind::Radio(fault, lasts) => self.radio_faults.begin(now, fault, lasts),
             IncidentKind::Intrusion(intrusion, lasts) => {
                 let pilot = Address::new(self.setup.aircraft.system_id, self.component_id);

@@ -5,10 +5,10 @@
 //! the percentage steps down: between two of them exactly that many percent were used. Each step gives one equation
 //!
 //! ```text
-//! units used = cell x cells flown + hover x nominal units hovered
+//! units used = cell x cells flown + hover x nominal units hovered + wind . net displacement in cells
 //! ```
 //!
-//! and the two prices are the least-squares solution over the last steps, at first with the nominal prices ([`Prices`]). Where
+//! and the prices are the least-squares solution over the last steps, at first with the nominal prices ([`Prices`]). Where
 //! the monitor counts mAh, and these agree with the percentage, each half percent of them gives such an equation instead
 //! ([`super::charge`]).
 //!
@@ -16,7 +16,7 @@
 //! belong to another wind, and both prices count by the same factor more.
 
 use crate::flight::charge::Charge;
-use crate::flight::prices::{Flown, Prices};
+use crate::flight::prices::{Flown, Price, Prices};
 use gleaner_units::BatteryUnits;
 
 /// Nominal units per second of hovering: half a unit for the two seconds in which 20 m are flown at 10 m/s.
@@ -72,7 +72,7 @@ impl Burn {
         Burn {
             prices: Prices::new(),
             recent: Prices::new(),
-            flown: Flown { cells: 0.0, hover: 0.0 },
+            flown: Flown { cells: 0.0, hover: 0.0, net: [0.0; 2] },
             percent: None,
             anchored: false,
             charge: Charge::new(),
@@ -80,9 +80,11 @@ impl Burn {
         }
     }
 
-    /// A fraction of a cell was flown.
-    pub(crate) fn flew(&mut self, cells: f32) {
+    /// A fraction of a cell was flown in this direction over the ground, north and east.
+    pub(crate) fn flew(&mut self, cells: f32, [north, east]: [f32; 2]) {
         self.flown.cells += cells;
+        self.flown.net[0] += cells * north;
+        self.flown.net[1] += cells * east;
     }
 
     /// The aircraft hovered for `secs`.
@@ -158,26 +160,30 @@ impl Burn {
         self.recent.learn(flown, used, RECENT_DECAY);
     }
 
-    /// Units that a cell and a nominal unit of hovering take, as learned.
-    pub(crate) fn learned(&self) -> (f32, f32) {
-        let (cell, hover) = self.prices.solve();
-        let factor = self.dearer();
-        (cell * factor, hover * factor)
+    /// Prices as learned. A cell has the dearer one of two: the mean of the courses that were flown, and the mean of upwind
+    /// and downwind.
+    pub(crate) fn learned(&self) -> Price {
+        let (flown, mut price) = (self.prices.solve(), self.prices.solve_with_wind());
+        let factor = self.dearer(&price);
+        price.cell = price.cell.max(flown.cell) * factor;
+        price.hover *= factor;
+        price.net = price.net.map(|net| net * factor);
+        price
     }
 
     /// The price of a nominal unit of hovering that a landing is judged by. What hovering took may be known only from before
     /// a change that cells showed since, so it is at least the mean of the window.
     pub(crate) fn descent_price(&self) -> f32 {
-        self.learned().1.max(self.prices.mean()).max(1.0)
+        self.learned().hover.max(self.prices.mean()).max(1.0)
     }
 
-    /// How much dearer the last few steps were than the window says: 1 if not clearly.
-    fn dearer(&self) -> f32 {
+    /// How much dearer the last few steps were than `price` says: 1 if not clearly.
+    fn dearer(&self, price: &Price) -> f32 {
         let recently = self.recent.flown();
         if recently.units() < RECENT_UNITS {
             return 1.0;
         }
-        let factor = self.recent.mean() / self.prices.mean_of(recently);
+        let factor = self.recent.used() / price.of(recently);
         if factor > DEARER { factor.min(DEAREST) } else { 1.0 }
     }
 
@@ -189,9 +195,24 @@ impl Burn {
             // A cell takes at least the hovering power of its time.
             return if slot > 1.0 { slot } else { 1.0 };
         }
-        let (cell, hover) = self.learned();
+        let Price { cell, hover, .. } = self.learned();
         let dearest = cell.max(hover * slot / 0.5);
         if dearest > NOISE { dearest * MARGIN } else { 1.0 }
+    }
+
+    /// Units that the way home takes for its course, beyond `price` for each of its cells: what the wind against it adds.
+    /// `net`: its net displacement towards north and east, in cells.
+    ///
+    /// The price times the cells and these units cover every way home that is no longer: what a detour adds by going against the
+    /// wind, it gets back.
+    pub(crate) fn headwind(&self, cells: f32, net: [f32; 2], price: f32) -> f32 {
+        let with_wind = self.prices.solve_with_wind();
+        if with_wind.net == [0.0; 2] {
+            return 0.0;
+        }
+        let factor = self.dearer(&with_wind);
+        let needed = (with_wind.cell * cells + with_wind.of_net(net)) * factor * MARGIN;
+        (needed - price * cells).max(0.0)
     }
 }
 
@@ -200,6 +221,7 @@ mod tests {
     use super::*;
 
     const FULL: BatteryUnits = BatteryUnits(100.0);
+    const NORTH: [f32; 2] = [1.0, 0.0];
 
     /// Flies cells and hovers in turn with these prices in percent.
     fn fly(cell: f32, hover_slot: f32, slots: usize) -> Burn {
@@ -211,7 +233,7 @@ mod tests {
                     burn.hovered(0.05);
                     left -= hover_slot / 40.0;
                 } else {
-                    burn.flew(0.025);
+                    burn.flew(0.025, NORTH);
                     left -= cell / 40.0;
                 }
                 burn.read(left as u8, None, FULL);
@@ -223,9 +245,9 @@ mod tests {
     #[test]
     fn prices_are_learned_from_whole_percents() {
         for (cell, hover_slot) in [(1.5, 0.5), (1.2, 0.6), (2.5, 0.4), (0.8, 0.3)] {
-            let (learned_cell, learned_hover) = fly(cell, hover_slot, 30).learned();
-            assert!((learned_cell - cell).abs() < 0.12 * cell, "{learned_cell} for {cell}");
-            assert!((learned_hover - hover_slot / 0.5).abs() < 0.4, "{learned_hover} for {hover_slot}");
+            let learned = fly(cell, hover_slot, 30).learned();
+            assert!((learned.cell - cell).abs() < 0.12 * cell, "{learned:?} for {cell}");
+            assert!((learned.hover - hover_slot / 0.5).abs() < 0.4, "{learned:?} for {hover_slot}");
         }
     }
 
@@ -240,23 +262,23 @@ mod tests {
         };
         for _ in 0..25 {
             for _ in 0..20 {
-                burn.flew(0.05);
+                burn.flew(0.05, NORTH);
                 left -= cell / 20.0;
                 read(&mut burn, left);
             }
         }
-        let (learned, _) = burn.learned();
+        let learned = burn.learned().cell;
         assert!((learned - cell).abs() < 0.1, "{learned}");
         // A percentage that jumps with the voltage does not disturb it.
         for percent in [20, 60, 30] {
             assert_eq!(burn.read(percent, Some((33.0 * (100.0 - left)) as u32), FULL), Reading::Jump);
         }
         for _ in 0..40 {
-            burn.flew(0.05);
+            burn.flew(0.05, NORTH);
             left -= 2.4 / 20.0;
             burn.read(30, Some((33.0 * (100.0 - left)) as u32), FULL);
         }
-        assert!(burn.learned().0 > learned + 0.1, "it goes on learning: {}", burn.learned().0);
+        assert!(burn.learned().cell > learned + 0.1, "it goes on learning: {}", burn.learned().cell);
     }
 
     #[test]
@@ -278,7 +300,7 @@ mod tests {
             let mut fly = |burn: &mut Burn, price: f32, percent: f32| {
                 let until = left - percent;
                 while left > until {
-                    burn.flew(0.05);
+                    burn.flew(0.05, NORTH);
                     left -= 0.05 * price;
                     burn.read(left as u8, None, FULL);
                 }
@@ -292,6 +314,27 @@ mod tests {
         }
     }
 
+    /// Crosswind and downwind were flown, and the way home is upwind.
+    #[test]
+    fn the_way_home_against_the_wind_is_dearer_than_the_way_out() {
+        let mut burn = Burn::new();
+        let mut left = 90.5_f32;
+        for leg in 0..12 {
+            let (direction, price) =
+                [([0.0, 1.0], 1.3), ([1.0, 0.0], 0.9), ([0.0, -1.0], 1.3), ([1.0, 0.0], 0.9)][leg % 4];
+            for _ in 0..60 {
+                burn.flew(0.05, direction);
+                left -= 0.05 * price;
+                burn.read(left as u8, None, FULL);
+            }
+        }
+        let price = burn.price(2.0);
+        let home = price * 10.0 + burn.headwind(10.0, [-10.0, 0.0], price);
+        assert!((15.5..18.5).contains(&home), "{home}: a cell upwind takes 1.7");
+        assert!(burn.headwind(10.0, [10.0, 0.0], price) < 0.2, "downwind the price of a cell suffices");
+        assert!(fly(0.98, 0.49, 40).headwind(10.0, [-10.0, 0.0], 1.0) < 0.5, "no wind");
+    }
+
     #[test]
     fn cells_that_grow_dear_make_the_landing_dearer() {
         let mut burn = fly(1.0, 0.5, 20);
@@ -299,7 +342,7 @@ mod tests {
         let mut left = 60.5_f32;
         burn.interrupt();
         while left > 30.0 {
-            burn.flew(0.05);
+            burn.flew(0.05, NORTH);
             left -= 0.05 * 1.8;
             burn.read(left as u8, None, FULL);
         }
@@ -313,7 +356,7 @@ mod tests {
         assert_eq!(burn.read(40, None, FULL), Reading::Jump);
         assert_eq!(burn.read(60, None, FULL), Reading::Jump);
         assert_eq!(burn.read(60, None, FULL), Reading::Same);
-        burn.flew(5.0);
+        burn.flew(5.0, NORTH);
         assert_eq!(burn.read(59, None, FULL), Reading::Step);
         assert_eq!(burn.learned(), before, "the interval after a jump has no exact start");
     }

@@ -72,10 +72,11 @@ impl Course {
         self.leg.units_ahead() + self.next.map_or(BatteryUnits(0.0), |next| next.units_ahead())
     }
 
-    /// Moves the target on. Returns the fraction of a cell that was flown and not counted when a leg ends here.
-    pub(crate) fn advance(&mut self, position: &Ned, cruise_mps: f32, secs: f32) -> f32 {
+    /// Moves the target on. When a leg ends here: the fraction of it that was flown and not counted, and its direction
+    /// towards north and east.
+    pub(crate) fn advance(&mut self, position: &Ned, cruise_mps: f32, secs: f32) -> Option<(f32, [f32; 2])> {
         if self.leg.purpose != Purpose::Move {
-            return 0.0;
+            return None;
         }
         let way = self.way();
         let lag_m = self.track.target(&way).position.horizontal_distance(position).0;
@@ -84,11 +85,11 @@ impl Course {
             Some(next) if way.continues() && self.track.is_at_end(&way) => {
                 self.track.enter_next(&way);
                 self.next = None;
-                let rest = self.leg.complete();
+                let rest = (self.leg.complete(), self.leg.direction().0);
                 self.leg = next;
-                rest
+                Some(rest)
             }
-            _ => 0.0,
+            _ => None,
         }
     }
 

@@ -84,7 +84,7 @@ impl Energy {
 
     /// Battery percent that a unit costs, as learned.
     pub(crate) fn unit_percent(&self, scene: &Scene<'_>) -> f32 {
-        self.burn.learned().0 * 100.0 / scene.inputs.parameters.full_battery().0
+        self.burn.learned().cell * 100.0 / scene.inputs.parameters.full_battery().0
     }
 
     /// Percent expected at touchdown after `ahead` and the way home from `cell`; negative when it does not suffice.
@@ -97,7 +97,9 @@ impl Energy {
         let percent = f32::from(scene.vehicle().battery_percent?);
         let way = f32::from(scene.guard.distance(cell)?) + ahead.0;
         let full = scene.inputs.parameters.full_battery().0;
-        Some(percent - way * self.unit_percent(scene) - self.landing(scene).0 * 100.0 / full)
+        let cell_price = self.burn.learned().cell;
+        let used = way * cell_price + self.headwind(scene, cell_price) + self.landing(scene).0;
+        Some(percent - used * 100.0 / full)
     }
 
     /// Percent expected at touchdown if everything that is available but the reserve is used.
@@ -105,7 +107,8 @@ impl Energy {
         let percent = f32::from(scene.vehicle().battery_percent?);
         let full = scene.inputs.parameters.full_battery().0;
         let used = self.available(scene, BatteryUnits(0.0)) - scene.guard.reserve();
-        let used = used.0 * self.burn.price(scene.slot().as_secs_f32()) + self.landing(scene).0;
+        let price = self.burn.price(scene.slot().as_secs_f32());
+        let used = used.0 * price + self.headwind(scene, price) + self.landing(scene).0;
         Some(percent - used * 100.0 / full)
     }
 
@@ -118,7 +121,7 @@ impl Energy {
     pub(crate) fn must_land(&self, scene: &Scene<'_>) -> bool {
         let full = scene.inputs.parameters.full_battery();
         let left = scene.vehicle().battery_percent.map(|percent| charge(percent, full));
-        left.is_some_and(|left| left.0 < self.landing(scene).0 + self.burn.learned().0)
+        left.is_some_and(|left| left.0 < self.landing(scene).0 + self.burn.learned().cell)
     }
 
     /// Units that the landing takes, from the flight altitude at the descent rate of the autopilot.
@@ -127,10 +130,18 @@ impl Energy {
         BatteryUnits(secs * HOVER_UNITS_PER_S * DESCENT_SHARE * self.burn.descent_price())
     }
 
-    /// Nominal units behind a percentage: less the landing, at the learned price.
+    /// Nominal units behind a percentage: less the landing and the wind against the way home, at the learned price.
     fn measured(&self, scene: &Scene<'_>, percent: u8) -> BatteryUnits {
+        let price = self.burn.price(scene.slot().as_secs_f32());
         let left = charge(percent, scene.inputs.parameters.full_battery()) - self.landing(scene);
-        BatteryUnits(left.0 / self.burn.price(scene.slot().as_secs_f32()))
+        BatteryUnits((left.0 - self.headwind(scene, price)) / price)
+    }
+
+    /// Units that the wind adds to the way home from where the aircraft is, beyond `price` for each cell.
+    fn headwind(&self, scene: &Scene<'_>, price: f32) -> f32 {
+        let Some((cell, net)) = scene.homeward() else { return 0.0 };
+        let cells = scene.guard.distance(cell).map_or(0.0, f32::from);
+        self.burn.headwind(cells, net, price)
     }
 }
 

@@ -146,10 +146,9 @@ impl Flight {
     fn move_on(&mut self, scene: &Scene<'_>, position: &Ned, secs: f32, energy: &mut Energy) {
         let is_heard = scene.heartbeat_age().is_some_and(|age| age <= Autopilot::EVIDENCE_AGE);
         let cruise_mps = if is_heard { scene.inputs.parameters.speed().0 } else { 0.0 };
-        let rest = self.course.advance(position, cruise_mps, secs * scene.pace);
-        if rest > 0.0 {
+        if let Some((rest, direction)) = self.course.advance(position, cruise_mps, secs * scene.pace) {
             self.stalls = 0;
-            energy.burn.flew(rest);
+            energy.burn.flew(rest, direction);
         }
     }
 
@@ -230,7 +229,7 @@ impl Flight {
     ) {
         let leg = &mut self.course.leg;
         match leg.purpose {
-            Purpose::Move => energy.burn.flew(leg.cover(position)),
+            Purpose::Move => energy.burn.flew(leg.cover(position), leg.direction().0),
             Purpose::Hover | Purpose::Centre => energy.burn.hovered(passed_s),
         }
         if energy.read(scene) {

@@ -14,7 +14,7 @@ use super::rules::Rule;
 use crate::autopilot::{AutopilotKind, Commander, Truth, VehicleMode};
 use crate::line::message_id;
 use crate::wire::parse;
-use gleaner_link::{Frame, FrameDecoder};
+use gleaner_link::{Frame, FrameDecoder, MAX_FRAME_BYTES};
 use gleaner_units::{Duration, Instant};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -56,8 +56,47 @@ pub(super) struct Custody {
     own_request: Option<VehicleMode>,
     failsafe_delivered: bool,
     foreign_since: Option<Instant>,
+    noise: Noise,
     /// Factor between the aircraft's time and the pilot's.
     speedup: f32,
+}
+
+/// What a receiver makes of a noisy line. A damaged length hides the frames behind it until so many bytes have come, so that a
+/// heartbeat on the line is not yet one that the pilot has.
+#[derive(Clone, Debug, Default)]
+struct Noise {
+    until: Instant,
+    /// Bytes after which the receiver is in step again.
+    bytes_left: usize,
+    receiver: FrameDecoder,
+}
+
+impl Noise {
+    /// Noise costs at most the frames that begin within this many bytes after it ([`FrameDecoder`]).
+    const REACH_BYTES: usize = 2 * MAX_FRAME_BYTES;
+
+    /// Takes in bytes. Returns whether they were read as a stream; `frames` are the ones that it completed.
+    fn receive(&mut self, now: Instant, bytes: &[u8], frames: &mut Vec<Frame>) -> bool {
+        if now < self.until {
+            self.bytes_left = Noise::REACH_BYTES;
+        }
+        if self.bytes_left == 0 {
+            return false;
+        }
+        self.bytes_left = self.bytes_left.saturating_sub(bytes.len());
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let taken = self.receiver.push(rest);
+            rest = &rest[taken..];
+            while let Some(frame) = self.receiver.next_frame() {
+                frames.push(frame);
+            }
+        }
+        if self.bytes_left == 0 {
+            self.receiver = FrameDecoder::new();
+        }
+        true
+    }
 }
 
 /// Heartbeats are a second apart; half a second for the line.
@@ -81,6 +120,7 @@ impl Custody {
             own_request: None,
             failsafe_delivered: false,
             foreign_since: None,
+            noise: Noise::default(),
             speedup,
         }
     }
@@ -96,6 +136,11 @@ impl Custody {
 
     /// A frame was delivered to the pilot that left the autopilot (or entered the line) at `left_at`.
     pub fn delivered(&mut self, left_at: Instant, bytes: &[u8]) {
+        let mut frames = Vec::new();
+        if self.noise.receive(left_at, bytes, &mut frames) {
+            frames.iter().for_each(|frame| self.received(left_at, frame));
+            return;
+        }
         if !matches!(message_id(bytes), Some(HEARTBEAT_DATA::ID | COMMAND_LONG_DATA::ID | PARAM_SET_DATA::ID))
         {
             return;
@@ -103,19 +148,29 @@ impl Custody {
         let mut decoder = FrameDecoder::new();
         // A frame is shorter than the decoder's buffer.
         let _ = decoder.push(bytes);
-        let Some(frame) = decoder.next_frame() else { return };
-        if let Some(heartbeat) = parse::<HEARTBEAT_DATA>(&frame) {
+        if let Some(frame) = decoder.next_frame() {
+            self.received(left_at, &frame);
+        }
+    }
+
+    fn received(&mut self, left_at: Instant, frame: &Frame) {
+        if let Some(heartbeat) = parse::<HEARTBEAT_DATA>(frame) {
             if (frame.sender.system, frame.sender.component) == (self.system_id, 1) {
                 self.heartbeat(left_at, &heartbeat);
             }
-        } else if self.is_engage_request(&frame) {
+        } else if self.is_engage_request(frame) {
             self.holder = Holder::Asked(left_at);
             self.own_request = None;
             self.foreign_since = None;
-        } else if self.is_off_request(&frame) {
+        } else if self.is_off_request(frame) {
             // The operator may take the aircraft back at any time.
             self.holder = Holder::Other;
         }
+    }
+
+    /// Bytes on the line to the pilot are damaged until then.
+    pub fn noisy_until(&mut self, until: Instant) {
+        self.noise.until = self.noise.until.max(until);
     }
 
     fn heartbeat(&mut self, left_at: Instant, heartbeat: &HEARTBEAT_DATA) {

@@ -142,6 +142,11 @@ impl Referee {
         self.custody.stalled_until(until);
     }
 
+    /// Bytes on the line to the pilot are damaged until then.
+    pub fn noisy_until(&mut self, until: Instant) {
+        self.custody.noisy_until(until);
+    }
+
     /// The position estimate is wrong until then: place, map and altitude are not judged.
     pub fn disturbed_until(&mut self, until: Instant) {
         self.disturbed_until = self.disturbed_until.max(until);

@@ -113,6 +113,29 @@ fn no_frame_may_move_the_aircraft_after_another_mode_arrived() {
     assert_eq!(stand.rules(), [Rule::TargetAfterTakeOver, Rule::CommandAfterTakeOver]);
 }
 
+/// The length of a damaged frame hides the heartbeat behind it until that many bytes have come.
+#[test]
+fn a_heartbeat_behind_a_damaged_frame_is_not_yet_received() {
+    for is_noisy in [true, false] {
+        let mut stand = Stand::engaged(AutopilotKind::Px4);
+        if is_noisy {
+            stand.referee.noisy_until(at(11_000));
+        }
+        let mut damaged = stand.autopilot.frame(&HEARTBEAT_DATA::DEFAULT);
+        damaged[1] = 200;
+        stand.referee.delivered(at(10_900), &damaged);
+        stand.heartbeat(at(10_920), VehicleMode::Hold, MavState::MAV_STATE_ACTIVE);
+        stand.target(at(10_930));
+        assert_eq!(stand.rules().is_empty(), is_noisy, "{:?}", stand.rules());
+        for _ in 0..10 {
+            let frame = stand.operator.frame(&HEARTBEAT_DATA::DEFAULT);
+            stand.referee.delivered(at(11_100), &frame);
+        }
+        stand.target(at(11_200));
+        assert_eq!(stand.rules(), [Rule::TargetAfterTakeOver]);
+    }
+}
+
 #[test]
 fn guided_again_gives_nothing_back_but_a_new_request_does() {
     let mut stand = Stand::engaged(AutopilotKind::ArduPilot);
