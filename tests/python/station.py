@@ -13,6 +13,7 @@ GUIDED = 4
 LOITER = 5
 RTL = 6
 DECISION = 40001
+NAN = float("nan")
 # How long anything may take, wall time. The simulation may run faster than the wall, never slower.
 PATIENCE_S = 60
 
@@ -107,6 +108,45 @@ def take_off(station, altitude_m):
         lambda m: m.get_type() == "LOCAL_POSITION_NED" and -m.z > altitude_m - 0.5,
         component=AUTOPILOT,
     )
+
+
+def px4_mode(main, sub=0):
+    """PX4's custom_mode: main mode in bits 16..23, sub mode in bits 24..31."""
+    return main << 16 | sub << 24
+
+
+OFFBOARD = px4_mode(6)
+HOLD = px4_mode(4, 3)
+
+
+def set_px4_mode(station, mode):
+    return station.command(AUTOPILOT, mav.MAV_CMD_DO_SET_MODE, 1, mode >> 16 & 255, mode >> 24)
+
+
+def take_off_px4(station, altitude_m):
+    """Take-off to an altitude above the ground (the command takes one above sea level), then HOLD."""
+    accepted = mav.MAV_RESULT_ACCEPTED
+    deadline = time.monotonic() + PATIENCE_S
+    home_m = station.wait(
+        "the altitude above sea level", lambda m: m.get_type() == "GLOBAL_POSITION_INT", component=AUTOPILOT
+    ).alt / 1000
+    while station.command(AUTOPILOT, mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) != accepted:
+        expect(time.monotonic() < deadline, "the autopilot does not arm")
+    takeoff = station.command(AUTOPILOT, mav.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, NAN, NAN, NAN, home_m + altitude_m)
+    expect(takeoff == accepted, f"take-off gave result {takeoff}")
+    station.wait(
+        "the altitude",
+        lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.relative_alt / 1000 > altitude_m - 0.5,
+        component=AUTOPILOT,
+    )
+    expect(set_px4_mode(station, HOLD) == accepted, "HOLD was refused")
+
+
+def enter_offboard(station):
+    """PX4 refuses OFFBOARD until targets are streamed."""
+    deadline = time.monotonic() + PATIENCE_S
+    while set_px4_mode(station, OFFBOARD) != mav.MAV_RESULT_ACCEPTED:
+        expect(time.monotonic() < deadline, "OFFBOARD was refused")
 
 
 def named_value(name, value):

@@ -2,7 +2,7 @@
 
 use crate::{DeviceSite, Mission, Vehicle};
 use core::fmt::{self, Write};
-use gleaner_link::{AutopilotCommand, Parameters, PositionTarget, Severity};
+use gleaner_link::{AutopilotCommand, Firmware, Parameters, PositionTarget, Severity};
 use gleaner_policy::DeviceState;
 use gleaner_units::{BatteryUnits, Duration, Instant, MetresPerSecond};
 use heapless::{String, Vec};
@@ -22,6 +22,27 @@ pub enum Request {
     HandBack,
 }
 
+/// What the autopilot is requested to do when the program ends in flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnStop {
+    /// Return to launch.
+    #[default]
+    Return,
+    /// Hold the position, for an operator who stands by.
+    Hold,
+}
+
+impl OnStop {
+    pub(crate) fn command(self, firmware: Option<Firmware>) -> AutopilotCommand {
+        match (self, firmware) {
+            (OnStop::Hold, Some(firmware @ (Firmware::ArduPilot | Firmware::Px4))) => {
+                AutopilotCommand::Hold(firmware)
+            }
+            _ => AutopilotCommand::ReturnToLaunch,
+        }
+    }
+}
+
 /// Limits that a program sets once. They are not parameters: an operator does not change them in flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
@@ -31,14 +52,17 @@ pub struct Rules {
     pub blind_return: Duration,
     /// Mean descent rate of the autopilot's landing: ArduCopter and PX4 took 57 s and 54 s from 60 m.
     pub descent_rate: MetresPerSecond,
+    /// What is requested when the program ends in flight. After every other fault it is a return.
+    pub on_stop: OnStop,
 }
 
 impl Rules {
-    /// 60 s, 60 s, 1.05 m/s.
+    /// 60 s, 60 s, 1.05 m/s, return.
     pub const DEFAULT: Rules = Rules {
         request_lifetime: Duration::from_secs(60),
         blind_return: Duration::from_secs(60),
         descent_rate: MetresPerSecond(1.05),
+        on_stop: OnStop::Return,
     };
 }
 

@@ -68,7 +68,7 @@ pub use decide::{
 pub use decide::{
     LoggedDecision, LoggedDevice, LoggedLookAhead, LoggedMission, LookAheadReplay, Replayed, SimulatedSlot,
 };
-pub use exchange::{Devices, Inputs, Notice, Outputs, RadioActivity, Request, Rules, Telemetry};
+pub use exchange::{Devices, Inputs, Notice, OnStop, Outputs, RadioActivity, Request, Rules, Telemetry};
 pub use machine::Machine;
 #[cfg(feature = "std")]
 pub use mission::file as mission_file;

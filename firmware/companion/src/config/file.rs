@@ -4,7 +4,7 @@ use super::{ConfigError, MOST_MODELS, RadioFormat, SigningConfig};
 use crate::logs::Limits;
 use gleaner_dashboard::{Token, http_address};
 use gleaner_link::{Operators, Parameters};
-use gleaner_pilot::Settings;
+use gleaner_pilot::{OnStop, Settings};
 use gleaner_policy::EngineKind;
 use gleaner_ports::Endpoint;
 use gleaner_radio::Calibration;
@@ -34,6 +34,7 @@ pub(super) struct File {
     pub state_dir: Option<PathBuf>,
     component_id: Option<Spanned<i64>>,
     system_id: Option<Spanned<i64>>,
+    on_stop: Option<Spanned<String>>,
     signing: Option<SigningTable>,
     #[serde(default)]
     pub log: LogTable,
@@ -125,7 +126,20 @@ impl Source<'_> {
         if let Some(operators) = &file.operators {
             settings.operators = self.operators(operators)?;
         }
+        if let Some(on_stop) = &file.on_stop {
+            settings.rules.on_stop = self.on_stop(on_stop)?;
+        }
         Ok(settings)
+    }
+
+    fn on_stop(&self, name: &Spanned<String>) -> Result<OnStop, ConfigError> {
+        match name.get_ref().as_str() {
+            "return" => Ok(OnStop::Return),
+            "hold" => Ok(OnStop::Hold),
+            other => {
+                Err(self.fault(name.span().start, format!("on_stop = {other:?}: there are return and hold")))
+            }
+        }
     }
 
     pub fn models<'f>(&self, file: &'f File) -> Result<&'f [PathBuf], ConfigError> {

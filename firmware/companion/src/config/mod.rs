@@ -14,6 +14,7 @@
 //! state_dir = "state"                         # optional
 //! component_id = 191                          # optional
 //! system_id = 1                               # optional: needed where several autopilots are on the link
+//! on_stop = "return"                          # or "hold": what is requested when the program ends in flight
 //!
 //! [signing]                                   # optional
 //! key = "signing.key"                         # 64 hexadecimal digits or a passphrase, mode 600

@@ -1,4 +1,5 @@
 use super::*;
+use gleaner_pilot::OnStop;
 
 const TEXT: &str = r#"model = "policy.onnx"
 mission = "missions/city.toml"
@@ -148,6 +149,18 @@ fn operators_and_the_radio_format_are_read() {
     assert!(
         fault(&with("radio_format = \"nmea\"")).contains("line 1: radio_format = \"nmea\": there are cobs")
     );
+}
+
+#[test]
+fn what_a_stop_in_flight_requests_is_return_or_hold() {
+    let on_stop = |line: &str| {
+        let config = merged(&Setup::default(), &format!("{line}\n{TEXT}"));
+        config.map(|config| config.settings.rules.on_stop)
+    };
+    assert_eq!(on_stop(""), Ok(OnStop::Return));
+    assert_eq!(on_stop("on_stop = \"hold\""), Ok(OnStop::Hold));
+    let refused = on_stop("on_stop = \"land\"").unwrap_err();
+    assert!(refused.contains("line 1: on_stop = \"land\": there are return and hold"), "{refused}");
 }
 
 /// The shipped file, cut, with parts repeated, left out or changed: nothing panics, and a fault is one line.

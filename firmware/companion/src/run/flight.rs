@@ -298,7 +298,7 @@ impl Flight {
         self.service.stopping();
         if self.onboard.state().flies() {
             self.onboard.say(Severity::Critical, format_args!("gleaner: stopped in flight, take over now"));
-            tracing::warn!("stopped in flight: requesting the autopilot to return");
+            tracing::warn!("stopped in flight: giving the aircraft back to the autopilot");
             self.onboard.hand_back();
             let deadline = Instant::now() + HAND_BACK;
             while self.onboard.is_handing_back() && Instant::now() < deadline {
@@ -306,7 +306,7 @@ impl Flight {
                 self.fly(|| Instant::now() >= tick);
             }
             if self.onboard.is_handing_back() {
-                tracing::error!("the autopilot has not accepted to return: take over now");
+                tracing::error!("the autopilot has not accepted the request: take over now");
             }
         } else {
             self.onboard.say(Severity::Warning, format_args!("gleaner: stopped"));

@@ -97,6 +97,8 @@ sent = [
         2000, 42, 1, 1, 3520, 12.5, -34.25, -60.0, 1.5, -2.5, 0.25, 0, 0, 0, 0, 0)),
     ("own_land", command_long((42, 1), 21, 0)),
     ("own_return_resent", command_long((42, 1), 20, 0, confirmation=1)),
+    ("own_hold_copter", m.MAVLink_command_long_message(42, 1, 176, 0, 1, 17, 0, 0, 0, 0, 0)),
+    ("own_hold_px4", m.MAVLink_command_long_message(42, 1, 176, 0, 1, 4, 3, 0, 0, 0, 0)),
     ("own_change_speed", m.MAVLink_command_long_message(42, 1, 178, 0, 1, 12.5, -1, 0, 0, 0, 0)),
     ("own_interval_position", m.MAVLink_command_long_message(42, 1, 511, 0, 32, 100000, 0, 0, 0, 0, 0)),
     ("own_request_origin", m.MAVLink_command_long_message(42, 1, 512, 0, 49, 0, 0, 0, 0, 0, 0)),

@@ -189,6 +189,8 @@ fn our_packets_are_those_of_pymavlink() {
     };
     sends("own_land", request(AutopilotCommand::Land));
     sends("own_return_resent", request(AutopilotCommand::ReturnToLaunch));
+    sends("own_hold_copter", request(AutopilotCommand::Hold(Firmware::ArduPilot)));
+    sends("own_hold_px4", request(AutopilotCommand::Hold(Firmware::Px4)));
     sends("own_change_speed", request(AutopilotCommand::ChangeSpeed(MetresPerSecond(12.5))));
     sends("own_ack_accepted", |bench| bench.hear("command_user_1"));
     sends("own_ack_denied", |bench| bench.hear("command_user_1_nan"));

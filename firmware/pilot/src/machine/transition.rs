@@ -1,7 +1,7 @@
 //! From state to state: the operator's requests, and what the states' steps come to.
 
 use super::{Machine, Phase};
-use crate::exchange::collected;
+use crate::exchange::{OnStop, collected};
 use crate::scene::Scene;
 use crate::states::Outcome;
 use crate::states::flying::Flight;
@@ -96,7 +96,9 @@ impl Machine {
 
     fn give_up(&mut self, now: Instant, fault: Fault, inputs: &Inputs<'_>, out: &mut Outputs) {
         let Phase::Flying(flight) = &self.phase else { return };
-        let hand_back = HandBack::new(now, flight.left(inputs.vehicle));
+        let on_stop = if fault == Fault::Stopped { inputs.rules.on_stop } else { OnStop::Return };
+        let command = on_stop.command(inputs.vehicle.firmware);
+        let hand_back = HandBack::new(now, flight.left(inputs.vehicle), command);
         self.enter(Phase::Fault(fault, hand_back), out);
     }
 

@@ -228,7 +228,7 @@ impl<P: Deliberator> Onboard<P> {
     }
 
     /// Gives the aircraft back before the program ends: with the next poll a flight ends, and the autopilot is requested
-    /// to return. Poll on until [`Onboard::is_handing_back`] is false or the program's patience ends.
+    /// to return or to hold ([`crate::OnStop`]). Poll on until [`Onboard::is_handing_back`] is false or the program's patience ends.
     pub fn hand_back(&mut self) {
         self.hand_back_requested = true;
     }

@@ -13,7 +13,7 @@ const PAUSE: Duration = Duration::from_secs(2);
 /// The same once [`ATTEMPTS`] have failed.
 const LONG_PAUSE: Duration = Duration::from_secs(10);
 
-/// The request to return to launch.
+/// The request to return to launch, or to hold the position where the program ends and its user has set that.
 ///
 /// ArduCopter keeps a position target without a timeout: without this request it would hover until its battery is empty.
 /// So the request is repeated until it is accepted, however long the line is bad. PX4 returns by itself one second
@@ -27,6 +27,7 @@ const LONG_PAUSE: Duration = Duration::from_secs(10);
 pub(crate) struct HandBack {
     /// `None` once there is nothing to give back.
     left: Option<Left>,
+    command: AutopilotCommand,
     /// A request needs a heartbeat after this.
     reason_at: Instant,
     /// When it may be requested again.
@@ -51,6 +52,7 @@ impl HandBack {
     pub(crate) const fn nothing() -> HandBack {
         HandBack {
             left: None,
+            command: AutopilotCommand::ReturnToLaunch,
             reason_at: Instant::ZERO,
             request_at: Instant::ZERO,
             waiting: false,
@@ -59,8 +61,8 @@ impl HandBack {
     }
 
     /// The aircraft is to be given back for a reason that arose now.
-    pub(crate) const fn new(now: Instant, left: Left) -> HandBack {
-        HandBack { left: Some(left), reason_at: now, request_at: now, waiting: false, failures: 0 }
+    pub(crate) const fn new(now: Instant, left: Left, command: AutopilotCommand) -> HandBack {
+        HandBack { left: Some(left), command, reason_at: now, request_at: now, waiting: false, failures: 0 }
     }
 
     /// Whether the aircraft still has to be given back.
@@ -70,8 +72,8 @@ impl HandBack {
 
     pub(crate) fn step(&mut self, scene: &Scene<'_>, out: &mut Outputs) -> Outcome {
         let (vehicle, inputs) = (scene.vehicle(), scene.inputs);
-        let returns = inputs.ended.iter().filter(|(command, _)| *command == AutopilotCommand::ReturnToLaunch);
-        for (_, accepted) in returns {
+        let requested = self.command;
+        for (_, accepted) in inputs.ended.iter().filter(|(command, _)| *command == requested) {
             if *accepted {
                 *self = HandBack::nothing();
             } else {
@@ -96,7 +98,7 @@ impl HandBack {
         if may_request && scene.is_ours_since(self.reason_at) {
             self.waiting = true;
             self.reason_at = scene.now;
-            out.command = Some(AutopilotCommand::ReturnToLaunch);
+            out.command = Some(self.command);
         }
         Outcome::Stay
     }
@@ -114,7 +116,8 @@ impl HandBack {
         self.failures = self.failures.wrapping_add(1);
         self.waiting = false;
         if self.failures.is_multiple_of(u16::from(ATTEMPTS)) {
-            out.say(Severity::Critical, format_args!("gleaner: autopilot does not return, take over"));
+            let verb = if self.command == AutopilotCommand::ReturnToLaunch { "return" } else { "hold" };
+            out.say(Severity::Critical, format_args!("gleaner: autopilot does not {verb}, take over"));
         }
         self.request_at = now + if self.failures < u16::from(ATTEMPTS) { PAUSE } else { LONG_PAUSE };
     }

@@ -2,7 +2,7 @@
 
 use crate::rig::Rig;
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode};
-use gleaner_pilot::{Fault, Request, State, TakeOver};
+use gleaner_pilot::{Fault, OnStop, Request, State, TakeOver};
 use gleaner_units::{Duration, Instant, Ned};
 
 const RETURN: AutopilotCommand = AutopilotCommand::ReturnToLaunch;
@@ -272,6 +272,25 @@ fn a_program_that_ends_in_flight_hands_the_aircraft_back() {
     idle.request = Some(Request::HandBack);
     idle.run(2.0);
     assert_eq!((idle.state(), idle.commands.len()), (State::Idle, 0));
+}
+
+#[test]
+fn a_program_that_ends_may_request_to_hold_instead() {
+    for firmware in [Firmware::ArduPilot, Firmware::Px4] {
+        let mut rig = Rig::engaged();
+        rig.vehicle.firmware = Some(firmware);
+        rig.rules.on_stop = OnStop::Hold;
+        rig.run(1.5);
+        rig.request = Some(Request::HandBack);
+        rig.run(1.2);
+        assert_eq!((rig.commanded(RETURN), rig.commanded(AutopilotCommand::Hold(firmware))), (0, 1));
+        assert!(!rig.machine.is_handing_back(), "{firmware:?}");
+    }
+    let mut other_fault = Rig::engaged();
+    other_fault.rules.on_stop = OnStop::Hold;
+    other_fault.vehicle.position = None;
+    other_fault.run(4.0);
+    assert_eq!(other_fault.commanded(RETURN), 1, "every other fault returns");
 }
 
 #[test]

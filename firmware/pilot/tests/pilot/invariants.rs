@@ -118,7 +118,7 @@ fn check(rig: &Rig, out: &Outputs, other_mode: bool, preferences: &mut Vec<[f32;
     }
     match out.command {
         None => {}
-        Some(AutopilotCommand::ReturnToLaunch) => {
+        Some(AutopilotCommand::ReturnToLaunch | AutopilotCommand::Hold(_)) => {
             assert!(state == State::Fault && guided && !other_mode && rig.vehicle.armed);
         }
         Some(AutopilotCommand::Land) => {

@@ -320,6 +320,7 @@ impl Rig {
             match command {
                 AutopilotCommand::Land => self.vehicle.mode = Some(FlightMode::Land),
                 AutopilotCommand::ReturnToLaunch => self.vehicle.mode = Some(FlightMode::Return),
+                AutopilotCommand::Hold(_) => self.vehicle.mode = Some(FlightMode::Hold),
                 AutopilotCommand::ChangeSpeed(_) => {}
             }
         }
