@@ -3,7 +3,12 @@
 mod fixture;
 
 use fixture::{Fixture, model, outcome};
-use std::net::UdpSocket;
+use gleaner_link::{Address, Packet};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
+use std::io::Write;
+use std::net::{TcpListener, UdpSocket};
+use std::process::Stdio;
 
 /// `gleaner check` that does not listen for an autopilot.
 fn check(fixture: &Fixture) -> std::process::Command {
@@ -106,6 +111,28 @@ fn an_autopilot_that_is_not_heard_makes_the_verdict() {
     assert_eq!(code, Some(1), "{stdout}");
     assert!(stdout.contains("warn  heartbeat  no byte received: check wiring"), "{stdout}");
     assert!(stdout.contains("ready, but no autopilot was heard, "), "{stdout}");
+}
+
+/// ArduPilot moves its last target on for some seconds after this program has died; PX4 does not.
+#[test]
+fn guid_timeout_is_named_where_an_ardupilot_is_heard() {
+    let autopilots =
+        [(MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA, true), (MavAutopilot::MAV_AUTOPILOT_PX4, false)];
+    for (autopilot, is_named) in autopilots {
+        let fixture = Fixture::new();
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcpout:{}", listener.local_addr().unwrap());
+        let mut gleaner = fixture.gleaner("check");
+        let checks =
+            gleaner.args(["--wait", "2", "--autopilot", &port]).stdout(Stdio::piped()).spawn().unwrap();
+        let (mut line, _) = listener.accept().unwrap();
+        let heartbeat =
+            HEARTBEAT_DATA { mavtype: MavType::MAV_TYPE_QUADROTOR, autopilot, ..HEARTBEAT_DATA::DEFAULT };
+        line.write_all(&Packet::new(&heartbeat).unwrap().frame(Address::new(7, 1), 0)).unwrap();
+        let (code, stdout, _) = outcome(&checks.wait_with_output().unwrap());
+        assert_eq!(code, Some(0), "{stdout}");
+        assert_eq!(stdout.contains("ArduPilot flies on for GUID_TIMEOUT"), is_named, "{stdout}");
+    }
 }
 
 /// The findings for the fixture's mission with one replacement.

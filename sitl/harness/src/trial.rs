@@ -7,6 +7,7 @@ use crate::operator::Switch;
 use crate::radio_fault::RadioFault;
 use crate::script::{ComputerFault, FlightScript, Incident, IncidentKind};
 use crate::setup::MissionPlan;
+use gleaner_pilot::Parameters;
 use gleaner_units::{BatteryUnits, Duration};
 use gleaner_world::{ScenarioKind, Seed, Stream};
 use rand::{Rng, RngExt};
@@ -40,7 +41,8 @@ impl Trial {
     /// The trial with this number: RD or RB, 1 to 12 devices (30 in one of sixteen), 60 to 120 battery units, up to
     /// three switches of the preference, and one or two fault classes, or none in one of eight. `calm` draws none.
     ///
-    /// The reserve covers the energy that the incidents take.
+    /// The reserve covers the energy that the incidents take. It is never below the default of `GLN_RESERVE`, which covers
+    /// what a wind or a consumption that begins in flight takes until it is learned.
     #[must_use]
     pub fn draw(number: u64, autopilot: AutopilotKind, calm: bool) -> Trial {
         let mut rng = Seed::evaluation(number).rng(Stream::Choices);
@@ -68,6 +70,7 @@ impl Trial {
             }
         }
         incidents.sort_by_key(|incident| incident.after);
+        let reserve = Parameters::default().reserve().0.max(reserve);
         // Enough for the shortest mission, whatever is kept back.
         let battery = BatteryUnits(f32::from(budget).max(reserve + 40.0));
         let plan = MissionPlan {

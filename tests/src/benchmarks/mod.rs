@@ -10,10 +10,12 @@ mod decision;
 mod engine;
 mod golden;
 mod instructions;
+mod latency;
 mod learning;
 mod live;
 mod machine;
 mod peer;
+mod planning;
 mod programs;
 mod timing;
 mod wire;
@@ -26,15 +28,17 @@ use std::time::Instant;
 /// Name and function of each part.
 type Part = (&'static str, fn(&mut String) -> Result<()>);
 
-const PARTS: [Part; 10] = [
+const PARTS: [Part; 12] = [
     ("engine", engine::inference),
     ("observation", engine::observation),
     ("decision", decision::decisions),
     ("world", world::steps),
+    ("planning", planning::missions),
     ("learning", learning::updates),
     ("wire", wire::packets),
     ("programs", programs::programs),
     ("flight", live::flight),
+    ("latency", latency::latency),
     ("sweep", programs::sweep),
     ("instructions", instructions::counts),
 ];

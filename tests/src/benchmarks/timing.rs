@@ -26,7 +26,12 @@ impl Times {
 
     /// The median.
     pub fn median(&self) -> f64 {
-        quantile(&self.0, 0.5)
+        self.quantile(0.5)
+    }
+
+    /// The time that this share of the repetitions does not exceed.
+    pub fn quantile(&self, at: f64) -> f64 {
+        quantile(&self.0, at)
     }
 
     /// `12.3 us (minimum 11.8)`.

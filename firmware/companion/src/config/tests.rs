@@ -175,7 +175,9 @@ fn damaged_files_are_refused_in_one_line() {
         }
         state as usize % below
     };
-    for _ in 0..3_000 {
+    // More for a long run: GLEANER_FUZZ_INPUTS=100000000.
+    let inputs = std::env::var("GLEANER_FUZZ_INPUTS").map_or(3_000_u64, |inputs| inputs.parse().unwrap());
+    for _ in 0..inputs {
         let mut bytes = valid.clone().into_bytes();
         for _ in 0..1 + draw(4) {
             let at = draw(bytes.len());

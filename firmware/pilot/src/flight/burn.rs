@@ -42,14 +42,14 @@ const MAH_PERCENT: f32 = 0.5;
 /// mean of those before.
 const MARGIN: f32 = 1.08;
 
-/// What a new percentage means.
+/// What a new percentage means. A jump teaches nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Reading {
     /// Nothing new.
     Same,
     /// It went down as flying does.
     Step,
-    /// It went up, or down by more than [`JUMP_PERCENT`].
+    /// It went up, or down by more than what flying can take: a cell failed, or the monitor did.
     Jump,
 }
 
@@ -116,7 +116,10 @@ impl Burn {
         }
         let was_anchored = core::mem::replace(&mut self.anchored, true);
         let step = last.saturating_sub(percent);
-        if step == 0 || step > JUMP_PERCENT {
+        let used = full.0 * f32::from(step) / 100.0;
+        // One percent at once may be the end of a long one; several were used since the last report.
+        let is_lost = step > 1 && was_anchored && by_mah.is_none() && used > DEAREST * self.flown.units();
+        if step == 0 || step > JUMP_PERCENT || is_lost {
             self.anchored = false;
             self.charge.jumped();
             if by_mah.is_none() {
@@ -128,7 +131,7 @@ impl Burn {
         if by_mah.is_none() {
             let flown = core::mem::take(&mut self.flown);
             if was_anchored {
-                self.learn(flown, full.0 * f32::from(step) / 100.0);
+                self.learn(flown, used);
             }
         }
         Reading::Step
@@ -143,8 +146,10 @@ impl Burn {
                 if percent >= MAH_PERCENT {
                     let flown = core::mem::take(&mut self.flown);
                     // A counter that leaps was reset, or counts another battery.
-                    if percent <= f32::from(JUMP_PERCENT) {
-                        self.learn(flown, full.0 * percent / 100.0);
+                    let used = full.0 * percent / 100.0;
+                    let is_lost = percent > 1.0 && used > DEAREST * flown.units();
+                    if percent <= f32::from(JUMP_PERCENT) && !is_lost {
+                        self.learn(flown, used);
                     }
                     self.mah = Some(mah);
                 }
@@ -182,11 +187,17 @@ impl Burn {
         }
     }
 
-    /// The price of a nominal unit of hovering that a landing is judged by. What hovering took may be known only from before
+    /// The price of a nominal unit of hovering that a landing is planned with. What hovering took may be known only from before
     /// a change that cells showed since, so it is at least the mean of the window.
     pub(crate) fn descent_price(&self) -> f32 {
         let price = self.learned().hover.max(self.prices.mean());
         if price > NOISE { price * MARGIN } else { price.max(1.0) }
+    }
+
+    /// The price of a nominal unit of hovering as it was learned from hovering, without a margin: what the landing will probably
+    /// take.
+    pub(crate) fn hover_price(&self) -> f32 {
+        self.prices.solve().hover.max(1.0)
     }
 
     /// How much dearer the last few steps were than `price` says: 1 if not clearly.
@@ -358,6 +369,19 @@ mod tests {
             burn.read(left as u8, None, FULL);
         }
         assert!(burn.descent_price() > 1.5, "{}", burn.descent_price());
+    }
+
+    /// A cell of the pack failed: the charge fell at once, and flying is as cheap as before.
+    #[test]
+    fn charge_that_is_lost_at_once_makes_nothing_dearer() {
+        for lost in 4..=JUMP_PERCENT {
+            let mut burn = fly(1.0, 0.5, 30);
+            let before = burn.learned();
+            let percent = burn.percent.unwrap();
+            burn.flew(0.4, NORTH);
+            assert_eq!(burn.read(percent - lost, None, FULL), Reading::Jump);
+            assert_eq!(burn.learned(), before, "{lost} %");
+        }
     }
 
     #[test]

@@ -121,13 +121,14 @@ impl Energy {
     pub(crate) fn must_land(&self, scene: &Scene<'_>) -> bool {
         let full = scene.inputs.parameters.full_battery();
         let left = scene.vehicle().battery_percent.map(|percent| charge(percent, full));
-        left.is_some_and(|left| left.0 < self.landing(scene).0 + self.burn.learned().cell)
+        // Without the margins of a plan: the terminal may be one cell away.
+        let landing = descent_units(scene) * self.burn.hover_price();
+        left.is_some_and(|left| left.0 < landing + self.burn.learned().cell)
     }
 
     /// Units that the landing takes, from the flight altitude at the descent rate of the autopilot.
     fn landing(&self, scene: &Scene<'_>) -> BatteryUnits {
-        let secs = scene.inputs.parameters.altitude().0 / scene.inputs.rules.descent_rate.0.max(0.1);
-        BatteryUnits(secs * HOVER_UNITS_PER_S * DESCENT_SHARE * self.burn.descent_price())
+        BatteryUnits(descent_units(scene) * self.burn.descent_price())
     }
 
     /// Nominal units behind a percentage: less the landing and the wind against the way home, at the learned price.
@@ -143,6 +144,12 @@ impl Energy {
         let cells = scene.guard.distance(cell).map_or(0.0, f32::from);
         self.burn.headwind(cells, net, price)
     }
+}
+
+/// Nominal units of descent and landing.
+fn descent_units(scene: &Scene<'_>) -> f32 {
+    let secs = scene.inputs.parameters.altitude().0 / scene.inputs.rules.descent_rate.0.max(0.1);
+    secs * HOVER_UNITS_PER_S * DESCENT_SHARE
 }
 
 /// Battery units behind a percentage.
