@@ -4,7 +4,6 @@ mod fixture;
 
 use fixture::{Fixture, model, outcome};
 use gleaner_link::{Address, Packet};
-use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 use std::io::Write;
 use std::net::{TcpListener, UdpSocket};

@@ -54,7 +54,7 @@ impl Vehicle {
     }
 
     fn send(&mut self, sender: Address, message: &impl MessageData) -> Result<()> {
-        let packet = Packet::new(message).ok().context("a message is too long")?;
+        let packet = Packet::new(message).context("a message is too long")?;
         let frame = packet.frame(sender, self.sequence);
         self.write(&frame);
         Ok(())
@@ -100,7 +100,7 @@ impl Vehicle {
         let [low, high] = TUNNEL_RADIO_REPORT.to_le_bytes();
         let mut payload = vec![low, high, AUTOPILOT.system, GLEANER, body.len() as u8];
         payload.extend_from_slice(&body);
-        if let Ok(packet) = Packet::from_payload(TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload) {
+        if let Some(packet) = Packet::from_payload(TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload) {
             let frame = packet.frame(AUTOPILOT, self.sequence);
             self.write(&frame);
         }

@@ -7,8 +7,7 @@ use crate::python;
 use anyhow::{Result, ensure};
 use gleaner_link::{Address, FrameDecoder, Message, Packet};
 use mavlink::dialects::ardupilotmega::{MavMessage, SET_POSITION_TARGET_LOCAL_NED_DATA};
-use mavlink::peek_reader::PeekReader;
-use mavlink::{MavHeader, MessageData};
+use mavlink::{MavHeader, MavlinkReader, MavlinkVersion};
 use std::cell::RefCell;
 use std::fmt::Write;
 use std::fs;
@@ -47,9 +46,9 @@ fn decode(stream: &[u8]) -> usize {
 
 /// Messages that the `mavlink` crate finds in the stream.
 fn decode_with_crate(stream: &[u8]) -> usize {
-    let mut reader = PeekReader::new(stream);
+    let mut reader = MavlinkReader::new(stream);
     let mut found = 0;
-    while let Ok((_, message)) = mavlink::read_v2_msg::<MavMessage, _>(&mut reader) {
+    while let Ok((_, message)) = reader.read_message::<MavMessage>(MavlinkVersion::V2) {
         black_box(&message);
         found += 1;
     }
@@ -75,7 +74,12 @@ pub(super) fn packets(page: &mut String) -> Result<()> {
     ensure!(decode_with_crate(&stream) == PACKETS, "the crate finds all packets of the stream");
     let peer = Peer::start(&python::interpreter()?, "wire_bench.py", &[file.display().to_string()])?;
     let peer = RefCell::new(peer);
-    let target = SET_POSITION_TARGET_LOCAL_NED_DATA { x: 1.0, y: 2.0, z: -60.0, ..MessageData::DEFAULT };
+    let target = SET_POSITION_TARGET_LOCAL_NED_DATA {
+        x: 1.0,
+        y: 2.0,
+        z: -60.0,
+        ..SET_POSITION_TARGET_LOCAL_NED_DATA::DEFAULT
+    };
     let sender = Address { system: 42, component: 191 };
     let read = || {
         let _ = black_box(decode(black_box(&stream)));
