@@ -186,6 +186,9 @@ fn pilot(endpoint: &str) -> Result<Pilot> {
     Ok(Pilot(command.spawn()?))
 }
 
+/// Starts a pilot with a vehicle on its line.
+type Connect = fn() -> Result<(Pilot, Vehicle)>;
+
 fn over_udp() -> Result<(Pilot, Vehicle)> {
     let free = UdpSocket::bind("127.0.0.1:0")?.local_addr()?;
     let socket = UdpSocket::bind("127.0.0.1:0")?;
@@ -205,7 +208,7 @@ fn over_terminal() -> Result<(Pilot, Vehicle)> {
 }
 
 /// Times in microseconds: report to target, heartbeat to target, and heartbeat of a take-over to the last target.
-fn measure(connect: fn() -> Result<(Pilot, Vehicle)>) -> Result<[Vec<f64>; 3]> {
+fn measure(connect: Connect) -> Result<[Vec<f64>; 3]> {
     let mut times = [const { Vec::new() }; 3];
     let micros = |from: Instant, to: Instant| to.saturating_duration_since(from).as_secs_f64() * 1e6;
     for start in 0..STARTS {
@@ -246,8 +249,7 @@ pub(super) fn latency(page: &mut String) -> Result<()> {
         ("the heartbeat that gives control", "the first target"),
         ("the heartbeat that takes control", "the last target"),
     ];
-    let lines: [(&str, fn() -> Result<(Pilot, Vehicle)>); 2] =
-        [("UDP, loopback", over_udp), ("serial, pty", over_terminal)];
+    let lines: [(&str, Connect); 2] = [("UDP, loopback", over_udp), ("serial, pty", over_terminal)];
     for (line, connect) in lines {
         for ((from, to), times) in events.into_iter().zip(measure(connect)?) {
             let times = Times::from_micros(times);

@@ -16,15 +16,15 @@
 //! belong to another wind, and both prices count by the same factor more.
 
 use crate::flight::charge::Charge;
-use crate::flight::prices::{Ageing, Flown, Price, Prices};
+use crate::flight::prices::{Flown, Price, Prices};
 use gleaner_units::BatteryUnits;
 
 /// Nominal units per second of hovering: half a unit for the two seconds in which 20 m are flown at 10 m/s.
 pub(crate) const HOVER_UNITS_PER_S: f32 = 0.25;
-/// A window of about 25 steps, and of 100 of the other kind.
-const WINDOW: Ageing = Ageing { same: 0.96, other: 0.99 };
-/// The last few steps: about four.
-const RECENT: Ageing = Ageing::evenly(0.75);
+/// Weight of an older equation per newer one: a window of about 25 steps.
+const DECAY: f32 = 0.96;
+/// The same for the last few steps: about four.
+const RECENT_DECAY: f32 = 0.75;
 /// From this factor on the last steps are dearer. The time of a step is known to one report of the battery, 2 s on PX4, which
 /// makes the price of four steps uncertain by about a tenth.
 const DEARER: f32 = 1.15;
@@ -40,7 +40,7 @@ const NOISE: f32 = 1.05;
 const MAH_PERCENT: f32 = 0.5;
 /// Margin on a learned price that is not nominal: gusts and braking make the last cells and the descent that much dearer than the
 /// mean of those before.
-const MARGIN: f32 = 1.08;
+const MARGIN: f32 = 1.05;
 
 /// What a new percentage means. A jump teaches nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -162,29 +162,15 @@ impl Burn {
     }
 
     fn learn(&mut self, flown: Flown, used: f32) {
-        self.prices.learn(flown, used, WINDOW);
-        self.recent.learn(flown, used, RECENT);
+        self.prices.learn(flown, used, DECAY);
+        self.recent.learn(flown, used, RECENT_DECAY);
     }
 
-    /// Prices as learned: each the dearer one of those without wind, where a cell has the mean of the courses that were flown,
-    /// and those with wind, where it has the mean of upwind and downwind.
+    /// Prices as learned, without wind, and as much dearer as the last few steps were.
     pub(crate) fn learned(&self) -> Price {
-        let (plain, wind) = (self.current(self.prices.solve()), self.with_wind());
-        Price { cell: plain.cell.max(wind.cell), hover: plain.hover.max(wind.hover), net: wind.net }
-    }
-
-    fn with_wind(&self) -> Price {
-        self.current(self.prices.solve_with_wind())
-    }
-
-    /// `price`, as much dearer as the last few steps were.
-    fn current(&self, price: Price) -> Price {
-        let factor = self.dearer(&price);
-        Price {
-            cell: price.cell * factor,
-            hover: price.hover * factor,
-            net: price.net.map(|net| net * factor),
-        }
+        let Price { cell, hover, net } = self.prices.solve();
+        let factor = self.dearer();
+        Price { cell: cell * factor, hover: hover * factor, net }
     }
 
     /// The price of a nominal unit of hovering that a landing is planned with. What hovering took may be known only from before
@@ -200,13 +186,13 @@ impl Burn {
         self.prices.solve().hover.max(1.0)
     }
 
-    /// How much dearer the last few steps were than `price` says: 1 if not clearly.
-    fn dearer(&self, price: &Price) -> f32 {
+    /// How much dearer the last few steps were than the window says: 1 if not clearly.
+    fn dearer(&self) -> f32 {
         let recently = self.recent.flown();
         if recently.units() < RECENT_UNITS {
             return 1.0;
         }
-        let factor = self.recent.used() / price.of(recently);
+        let factor = self.recent.used() / self.prices.solve().of(recently);
         if factor > DEARER { factor.min(DEAREST) } else { 1.0 }
     }
 
@@ -229,7 +215,7 @@ impl Burn {
     /// The price times the cells and these units cover every way home that is no longer: what a detour adds by going against the
     /// wind, it gets back.
     pub(crate) fn headwind(&self, cells: f32, net: [f32; 2], price: f32) -> f32 {
-        let with_wind = self.with_wind();
+        let with_wind = self.prices.solve_with_wind();
         if with_wind.net == [0.0; 2] {
             return 0.0;
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix4, Vector4};
 
-/// Weight of the prior, in nominal units.
+/// Weight of the nominal prices, in nominal units.
 const PRIOR: f32 = 1.0;
 /// Share of cells below which a window counts as hovering only.
 const HOVERING: f32 = 0.1;
@@ -15,8 +15,12 @@ const DEAREST: f32 = 3.0;
 const LEAST_UNITS: f32 = 0.05;
 /// Weight of no wind, in cells.
 const WIND_PRIOR: f32 = 1.0;
-/// A weaker wind is noise of whole percents. Units per cell: a tenth is a wind of about 3 m/s.
-const CALM: f32 = 0.1;
+/// Cells without which no wind is told from noise.
+const WIND_CELLS: f32 = 10.0;
+/// A weaker wind is noise of whole percents. Units per cell: a seventh is a wind of about 1.5 m/s.
+const CALM: f32 = 0.15;
+/// The same for the price of a cell against the wind: up to here the nominal price, with its margins, covers it.
+const BREEZE: f32 = 1.3;
 
 /// Nominal units flown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,7 +70,7 @@ impl Price {
         let [north, east] = self.net;
         let strength = libm::hypotf(north, east);
         // `NaN` is no wind either.
-        let is_wind = strength > CALM && strength < DEAREST;
+        let is_wind = strength > CALM && strength < DEAREST && self.cell + strength > BREEZE;
         let net = if is_wind { self.net } else { [0.0; 2] };
         Price { cell: sound(self.cell), hover: sound(self.hover), net }
     }
@@ -83,81 +87,34 @@ impl Price {
 /// the mean price of each step, one in which the aircraft brakes and hardly advances would.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Prices {
-    /// Equations of flying, and those of hovering: they may age apart ([`Ageing`]).
-    kinds: [Sums; 2],
-    /// Units flown and used in all equations, which age together.
-    flown: f32,
-    used: f32,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Sums {
     /// Of the terms cells, hover, net north, net east.
     gram: Matrix4<f32>,
     /// Of each term and what was used.
     moments: Vector4<f32>,
 }
 
-/// What is left of the weight of older equations with each newer one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ageing {
-    /// Of the same kind.
-    pub(crate) same: f32,
-    /// Of the other kind. A long hover shows nothing of the wind against the way home, so it must not make it forgotten.
-    pub(crate) other: f32,
-}
-
-impl Ageing {
-    pub(crate) const fn evenly(decay: f32) -> Ageing {
-        Ageing { same: decay, other: decay }
-    }
-}
-
-impl Sums {
-    const NOTHING: Sums = Sums {
-        gram: Matrix4::new(0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0.),
-        moments: Vector4::new(0., 0., 0., 0.),
-    };
-
-    fn age(&mut self, decay: f32) {
-        self.gram *= decay;
-        self.moments *= decay;
-    }
-
-    fn learn(&mut self, terms: Vector4<f32>, used: f32, units: f32) {
-        self.gram += terms * terms.transpose() / units;
-        self.moments += terms * (used / units);
-    }
-}
-
 impl Prices {
     pub(crate) const fn new() -> Prices {
-        Prices { kinds: [Sums::NOTHING; 2], flown: 0.0, used: 0.0 }
+        Prices {
+            gram: Matrix4::new(0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0.),
+            moments: Vector4::new(0., 0., 0., 0.),
+        }
     }
 
-    /// Takes in one equation.
-    pub(crate) fn learn(&mut self, flown: Flown, used: f32, ageing: Ageing) {
+    /// Takes in one equation. `decay`: what is left of the weight of the older ones.
+    pub(crate) fn learn(&mut self, flown: Flown, used: f32, decay: f32) {
         let units = flown.units();
         if units.is_nan() || units < LEAST_UNITS {
             return;
         }
-        let [flying, hovering] = &mut self.kinds;
-        let (same, other) = if flown.cells > flown.hover { (flying, hovering) } else { (hovering, flying) };
-        same.age(ageing.same);
-        other.age(ageing.other);
-        same.learn(flown.terms(), used, units);
-        self.flown = self.flown * ageing.same + units;
-        self.used = self.used * ageing.same + used;
-    }
-
-    fn sums(&self) -> Sums {
-        let [flying, hovering] = self.kinds;
-        Sums { gram: flying.gram + hovering.gram, moments: flying.moments + hovering.moments }
+        let terms = flown.terms();
+        self.gram = self.gram * decay + terms * terms.transpose() / units;
+        self.moments = self.moments * decay + terms * (used / units);
     }
 
     /// The prices without wind. Where only one course was flown, they are the prices on that course.
     pub(crate) fn solve(&self) -> Price {
-        let Sums { gram, moments } = self.sums();
+        let Prices { gram, moments } = *self;
         let (cc, ch, hh) = (gram.m11 + PRIOR, gram.m12, gram.m22 + PRIOR);
         let (cu, hu) = (moments.x + PRIOR * self.unflown_cell(), moments.y + PRIOR);
         let determinant = cc * hh - ch * ch;
@@ -167,7 +124,10 @@ impl Prices {
 
     /// The prices with what the wind adds to each course. Without wind, those of [`Prices::solve`].
     pub(crate) fn solve_with_wind(&self) -> Price {
-        let Sums { gram, moments } = self.sums();
+        if self.flown().cells < WIND_CELLS {
+            return self.solve();
+        }
+        let Prices { gram, moments } = *self;
         let prior = Vector4::new(PRIOR, PRIOR, WIND_PRIOR, WIND_PRIOR);
         let moments = moments + Vector4::new(PRIOR * self.unflown_cell(), PRIOR, 0.0, 0.0);
         let solved = (gram + Matrix4::from_diagonal(&prior)).try_inverse().map(|inverse| inverse * moments);
@@ -186,33 +146,29 @@ impl Prices {
     /// What was flown in the equations.
     pub(crate) fn flown(&self) -> Flown {
         // Each row of the gram matrix is a term times the units of its equation, by these units.
-        let gram = self.sums().gram;
-        let sums = gram.column(0) + gram.column(1);
+        let sums = self.gram.column(0) + self.gram.column(1);
         Flown { cells: sums.x, hover: sums.y, net: [sums.z, sums.w] }
     }
 
     /// What was used in the equations.
     pub(crate) fn used(&self) -> f32 {
-        let moments = self.sums().moments;
-        moments.x + moments.y
+        self.moments.x + self.moments.y
     }
 
-    /// The mean price in the last equations of any kind; 1 before there is one.
+    /// The mean price in the equations; 1 before there is one.
     pub(crate) fn mean(&self) -> f32 {
-        if self.flown > 0.0 { self.used / self.flown } else { 1.0 }
+        let units = self.flown().units();
+        if units > 0.0 { self.used() / units } else { 1.0 }
     }
 
     pub(crate) fn has_learned(&self) -> bool {
-        self.flown > 0.0
+        self.flown().units() > 0.0
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const STAY: Ageing = Ageing::evenly(1.0);
-    const AGEING: Ageing = Ageing { same: 0.96, other: 0.99 };
 
     fn flown(cells: f32, hover: f32) -> Flown {
         Flown { cells, hover, net: [0.0; 2] }
@@ -226,7 +182,7 @@ mod tests {
     fn the_prices_explain_the_equations() {
         let mut prices = Prices::new();
         for (cells, hover) in [(1.0, 0.0), (0.5, 0.5), (0.0, 1.0), (0.8, 0.1)].repeat(10) {
-            prices.learn(flown(cells, hover), 1.6 * cells + 0.8 * hover, STAY);
+            prices.learn(flown(cells, hover), 1.6 * cells + 0.8 * hover, 1.0);
         }
         let price = prices.solve();
         assert!((price.cell - 1.6).abs() < 0.08 && (price.hover - 0.8).abs() < 0.08, "{price:?}");
@@ -243,7 +199,7 @@ mod tests {
         let flights =
             [course(-1.0, 0.0), course(-1.0, 0.0), course(0.0, 1.0), course(0.0, -1.0), course(1.0, 0.0)];
         for flown in flights.repeat(5) {
-            prices.learn(flown, 1.2 * flown.cells + 0.4 * flown.net[0], STAY);
+            prices.learn(flown, 1.2 * flown.cells + 0.4 * flown.net[0], 1.0);
         }
         let price = prices.solve_with_wind();
         let north = price.of(course(1.0, 0.0));
@@ -254,30 +210,16 @@ mod tests {
     #[test]
     fn a_dear_single_course_is_as_dear_on_the_way_back() {
         let mut prices = Prices::new();
-        (0..25).for_each(|_| prices.learn(course(-1.0, 0.0), 1.7, STAY));
+        (0..25).for_each(|_| prices.learn(course(-1.0, 0.0), 1.7, 1.0));
         // Wind cannot be told from consumption here.
         let (plain, back) = (prices.solve(), prices.solve_with_wind().of(course(1.0, 0.0)));
         assert!((plain.cell - 1.67).abs() < 0.05 && back < plain.cell, "{plain:?} {back}");
     }
 
     #[test]
-    fn a_long_hover_does_not_make_the_wind_forgotten() {
-        let mut prices = Prices::new();
-        for flown in [course(-1.0, 0.0), course(0.0, 1.0), course(1.0, 0.0), course(0.0, -1.0)].repeat(5) {
-            prices.learn(flown, 1.3 * flown.cells - 0.4 * flown.net[0], AGEING);
-        }
-        let before = prices.solve_with_wind();
-        (0..50).for_each(|_| prices.learn(flown(0.0, 1.0), 1.2, AGEING));
-        let after = prices.solve_with_wind();
-        let upwind = |price: Price| price.of(course(-10.0, 0.0));
-        assert!((upwind(after) - upwind(before)).abs() < 1.0, "{before:?} {after:?}");
-        assert!((after.hover - 1.2).abs() < 0.02, "{after:?}");
-    }
-
-    #[test]
     fn cells_are_dearer_than_the_hovering_that_was_flown() {
         let mut prices = Prices::new();
-        (0..25).for_each(|_| prices.learn(flown(0.0, 1.0), 1.6, STAY));
+        (0..25).for_each(|_| prices.learn(flown(0.0, 1.0), 1.6, 1.0));
         let Price { cell, hover, .. } = prices.solve();
         assert!((cell - 2.2).abs() < 0.01 && (hover - 1.6).abs() < 0.05, "{cell} {hover}");
     }
@@ -285,7 +227,7 @@ mod tests {
     #[test]
     fn nominal_hovering_leaves_cells_nominal() {
         let mut prices = Prices::new();
-        (0..25).for_each(|_| prices.learn(flown(0.0, 1.0), 0.98, STAY));
+        (0..25).for_each(|_| prices.learn(flown(0.0, 1.0), 0.98, 1.0));
         let Price { cell, hover, .. } = prices.solve();
         assert!((cell - 1.0).abs() < 0.01 && (hover - 0.98).abs() < 0.01, "{cell} {hover}");
     }
@@ -293,16 +235,16 @@ mod tests {
     #[test]
     fn a_step_without_advance_is_no_dear_wind() {
         let mut prices = Prices::new();
-        (0..5).for_each(|_| prices.learn(flown(0.7, 0.0), 0.7, Ageing::evenly(0.8)));
-        prices.learn(flown(0.06, 0.0), 0.7, Ageing::evenly(0.8));
+        (0..5).for_each(|_| prices.learn(flown(0.7, 0.0), 0.7, 0.8));
+        prices.learn(flown(0.06, 0.0), 0.7, 0.8);
         assert!(prices.mean() < 1.4, "{}", prices.mean());
     }
 
     #[test]
     fn charge_that_falls_by_itself_teaches_nothing() {
         let mut prices = Prices::new();
-        prices.learn(Flown::default(), 3.0, STAY);
-        prices.learn(Flown { cells: f32::NAN, ..Flown::default() }, 3.0, STAY);
+        prices.learn(Flown::default(), 3.0, 1.0);
+        prices.learn(Flown { cells: f32::NAN, ..Flown::default() }, 3.0, 1.0);
         assert!(!prices.has_learned());
         assert_eq!(prices.solve_with_wind(), Price { cell: 1.0, hover: 1.0, net: [0.0; 2] });
     }
