@@ -35,9 +35,7 @@ pub enum OnStop {
 impl OnStop {
     pub(crate) fn command(self, firmware: Option<Firmware>) -> AutopilotCommand {
         match (self, firmware) {
-            (OnStop::Hold, Some(firmware @ (Firmware::ArduPilot | Firmware::Px4))) => {
-                AutopilotCommand::Hold(firmware)
-            }
+            (OnStop::Hold, Some(firmware)) => AutopilotCommand::Hold(firmware),
             _ => AutopilotCommand::ReturnToLaunch,
         }
     }

@@ -70,18 +70,21 @@ impl<'a> Scene<'a> {
     pub(crate) fn outside_grid(&self) -> Option<Metres> {
         let vehicle = self.vehicle();
         let grid = self.mission.grid();
-        let point = GridFrame::new(grid, self.mission.pose, vehicle.origin?).point(&vehicle.position?);
+        let point = self.frame()?.point(&vehicle.position?);
         let beyond = |at_m: f32, cells: u16| (-at_m).max(at_m - f32::from(cells) * grid.cell().0).max(0.0);
         let (east_m, north_m) = (beyond(point.east_m, grid.width()), beyond(point.north_m, grid.height()));
         let outside_m = libm::hypotf(east_m, north_m);
         (outside_m > 0.0).then_some(Metres(outside_m))
     }
 
+    /// The mission's grid in the autopilot's local frame, when its origin is known.
+    fn frame(&self) -> Option<GridFrame> {
+        Some(GridFrame::new(self.mission.grid(), self.mission.pose, self.vehicle().origin?))
+    }
+
     /// The cell under the aircraft and its offset from the centre in metres, when both are known.
     pub(crate) fn cell_under(&self) -> Option<(Cell, f32)> {
-        let vehicle = self.vehicle();
-        let frame = GridFrame::new(self.mission.grid(), self.mission.pose, vehicle.origin?);
-        let position = vehicle.position?;
+        let (frame, position) = (self.frame()?, self.vehicle().position?);
         let cell = frame.cell(&position)?;
         Some((cell, position.horizontal_distance(&frame.centre(cell, position.down_m)).0))
     }
@@ -89,12 +92,9 @@ impl<'a> Scene<'a> {
     /// The cell under the aircraft, and the displacement from the aircraft to the terminal's centre towards north and east, in
     /// cells.
     pub(crate) fn homeward(&self) -> Option<(Cell, [f32; 2])> {
-        let vehicle = self.vehicle();
-        let grid = self.mission.grid();
-        let frame = GridFrame::new(grid, self.mission.pose, vehicle.origin?);
-        let position = vehicle.position?;
+        let (frame, position) = (self.frame()?, self.vehicle().position?);
         let home = frame.centre(self.mission.terminal, position.down_m);
-        let to_cells = |from_m: f32, to_m: f32| (to_m - from_m) / grid.cell().0;
+        let to_cells = |from_m: f32, to_m: f32| (to_m - from_m) / self.mission.grid().cell().0;
         let net = [to_cells(position.north_m, home.north_m), to_cells(position.east_m, home.east_m)];
         Some((frame.cell(&position)?, net))
     }

@@ -1,5 +1,6 @@
 //! Latency of `gleaner run`: from the last byte of a heartbeat or a radio report to the first byte of a position target.
 
+use super::programs::Program;
 use super::timing::Times;
 use crate::programs::{path, repository};
 use anyhow::{Context, Result, bail, ensure};
@@ -14,7 +15,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::fmt::Write;
 use std::net::UdpSocket;
 use std::os::fd::OwnedFd;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Starts of the program on each line: each gives one time of a report and [`TAKE_OVERS`] of the others.
@@ -170,27 +171,17 @@ impl Vehicle {
     }
 }
 
-/// `gleaner run`, ended with this value.
-struct Pilot(Child);
-
-impl Drop for Pilot {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn pilot(endpoint: &str) -> Result<Pilot> {
+fn pilot(endpoint: &str) -> Result<Program> {
     let words = ["run", "--mission", "firmware/companion/dist/mission.toml", "--autopilot", endpoint];
     let mut command = Command::new(path("gleaner"));
     command.args(words).current_dir(repository()).stdout(Stdio::null()).stderr(Stdio::null());
-    Ok(Pilot(command.spawn()?))
+    Ok(Program(command.spawn()?))
 }
 
 /// Starts a pilot with a vehicle on its line.
-type Connect = fn() -> Result<(Pilot, Vehicle)>;
+type Connect = fn() -> Result<(Program, Vehicle)>;
 
-fn over_udp() -> Result<(Pilot, Vehicle)> {
+fn over_udp() -> Result<(Program, Vehicle)> {
     let free = UdpSocket::bind("127.0.0.1:0")?.local_addr()?;
     let socket = UdpSocket::bind("127.0.0.1:0")?;
     socket.connect(free)?;
@@ -198,7 +189,7 @@ fn over_udp() -> Result<(Pilot, Vehicle)> {
     Ok((pilot(&format!("udpin:{free}"))?, Vehicle::new(socket.into())))
 }
 
-fn over_terminal() -> Result<(Pilot, Vehicle)> {
+fn over_terminal() -> Result<(Program, Vehicle)> {
     let far = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
     grantpt(&far)?;
     unlockpt(&far)?;

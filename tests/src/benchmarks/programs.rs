@@ -20,7 +20,7 @@ const SWEEP_FLIGHTS: u32 = 200;
 const HEARTBEAT: &str = "heartbeat_copter_guided";
 
 /// A program that ends with this value.
-struct Program(Child);
+pub(super) struct Program(pub Child);
 
 impl Drop for Program {
     fn drop(&mut self) {

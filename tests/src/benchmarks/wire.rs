@@ -120,8 +120,7 @@ pub(super) fn packets(page: &mut String) -> Result<()> {
     writeln!(
         page,
         "## Wire\n\nMAVLink 2 packets, one thread. In: a stream of heartbeats, positions, battery states and RC channels, \
-         decoded to messages, in reads of {READ_BYTES} bytes. Out: position \
-         targets.\n\n\
+         decoded to messages, in reads of {READ_BYTES} bytes (the crate reads as it likes). Out: position targets.\n\n\
          | direction | program | per packet | million packets/s | program / gleaner |\n|---|---|---|---|---|"
     )?;
     for (contenders, times) in contenders.chunks(3).zip(times.chunks(3)) {
