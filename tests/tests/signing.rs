@@ -53,13 +53,10 @@ impl Port {
         if let Ok((length, from)) = self.socket.recv_from(&mut datagram) {
             self.decoder.begin_datagram();
             let mut bytes = &datagram[..length];
-            while !bytes.is_empty() {
-                bytes = &bytes[self.decoder.push(bytes)..];
-                while let Some(frame) = self.decoder.next_frame() {
-                    if self.signing.check(&frame).is_ok() {
-                        self.peer = Some(from);
-                        self.component.receive_frame(now, &frame);
-                    }
+            while let Some(frame) = self.decoder.read(&mut bytes) {
+                if self.signing.check(&frame).is_ok() {
+                    self.peer = Some(from);
+                    self.component.receive_frame(now, &frame);
                 }
             }
         }

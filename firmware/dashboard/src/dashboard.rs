@@ -103,14 +103,10 @@ impl Dashboard {
 
     /// Bytes on the vehicle's link: of the pilot, of the autopilot, in any pieces.
     pub fn heard(&mut self, mut bytes: &[u8]) {
-        while !bytes.is_empty() {
-            let taken = self.decoder.push(bytes);
-            bytes = bytes.get(taken..).unwrap_or_default();
-            while let Some(frame) = self.decoder.next_frame() {
-                self.client.receive(&frame);
-                if let Some(Heard::Text(text)) = self.station.receive(self.t_s, &frame) {
-                    self.server.publish(Event::Text(text));
-                }
+        while let Some(frame) = self.decoder.read(&mut bytes) {
+            self.client.receive(&frame);
+            if let Some(Heard::Text(text)) = self.station.receive(self.t_s, &frame) {
+                self.server.publish(Event::Text(text));
             }
         }
     }

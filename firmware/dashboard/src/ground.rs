@@ -141,9 +141,7 @@ mod tests {
     const PILOT: Address = Address::new(1, 191);
 
     fn decoded(bytes: &[u8]) -> Frame {
-        let mut decoder = FrameDecoder::new();
-        assert_eq!(decoder.push(bytes), bytes.len());
-        decoder.next_frame().unwrap()
+        FrameDecoder::new().read(&mut &*bytes).unwrap()
     }
 
     fn command(frame: &[u8]) -> Option<gleaner_link::Command> {

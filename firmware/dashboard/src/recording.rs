@@ -69,13 +69,9 @@ impl<P: Policy> Recording<P> {
 
     /// A frame on the vehicle's link.
     pub fn frame(&mut self, t_s: f64, mut bytes: &[u8]) {
-        while !bytes.is_empty() {
-            let taken = self.decoder.push(bytes);
-            bytes = bytes.get(taken..).unwrap_or_default();
-            while let Some(frame) = self.decoder.next_frame() {
-                if let Some(Heard::Text(text)) = self.station.receive(t_s, &frame) {
-                    self.flight.add(Event::Text(text));
-                }
+        while let Some(frame) = self.decoder.read(&mut bytes) {
+            if let Some(Heard::Text(text)) = self.station.receive(t_s, &frame) {
+                self.flight.add(Event::Text(text));
             }
         }
         if t_s >= self.next_live_s {

@@ -11,11 +11,14 @@ pub(crate) struct Fields<'a>(pub &'a [u8]);
 
 impl Fields<'_> {
     fn array<const N: usize>(&self, at: usize) -> [u8; N] {
-        let mut bytes = [0; N];
-        for (byte, source) in bytes.iter_mut().zip(self.0.get(at..).unwrap_or(&[])) {
-            *byte = *source;
-        }
-        bytes
+        let rest = self.0.get(at..).unwrap_or(&[]);
+        rest.first_chunk().copied().unwrap_or_else(|| {
+            let mut bytes = [0; N];
+            for (byte, source) in bytes.iter_mut().zip(rest) {
+                *byte = *source;
+            }
+            bytes
+        })
     }
 
     pub fn u8(&self, at: usize) -> u8 {

@@ -108,16 +108,12 @@ impl Simulation {
     /// Bytes from the companion to the autopilot, in any pieces.
     pub fn from_companion(&mut self, mut bytes: &[u8]) {
         let now = self.now;
-        while !bytes.is_empty() {
-            let taken = self.tap.push(bytes);
-            bytes = &bytes[taken..];
-            while let Some(frame) = self.tap.next_frame() {
-                let raw = relayed(&frame);
-                self.journal.frame(now, &raw);
-                self.referee.sent(now, &frame);
-                self.read_companion(&frame);
-                self.line.send(now, Lane::Up, raw);
-            }
+        while let Some(frame) = self.tap.read(&mut bytes) {
+            let raw = relayed(&frame);
+            self.journal.frame(now, &raw);
+            self.referee.sent(now, &frame);
+            self.read_companion(&frame);
+            self.line.send(now, Lane::Up, raw);
         }
         self.carry_up();
     }
@@ -129,17 +125,14 @@ impl Simulation {
     }
 
     /// Bytes from the ground station, in any pieces.
-    pub fn from_ground(&mut self, mut bytes: &[u8]) {
-        let now = self.now;
-        let all = bytes;
-        while !bytes.is_empty() && !self.journal.is_off() {
-            let taken = self.ground_tap.push(bytes);
-            bytes = &bytes[taken..];
-            while let Some(frame) = self.ground_tap.next_frame() {
-                self.journal.frame(now, &relayed(&frame));
+    pub fn from_ground(&mut self, bytes: &[u8]) {
+        if !self.journal.is_off() {
+            let mut rest = bytes;
+            while let Some(frame) = self.ground_tap.read(&mut rest) {
+                self.journal.frame(self.now, &relayed(&frame));
             }
         }
-        self.autopilot.receive(LinkId::GROUND, all);
+        self.autopilot.receive(LinkId::GROUND, bytes);
     }
 
     /// Frames that have arrived at the companion. The caller reports each to [`Simulation::delivered`] when the pilot

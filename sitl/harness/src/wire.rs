@@ -124,9 +124,7 @@ mod tests {
     use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
 
     fn decode(bytes: &[u8]) -> Frame {
-        let mut decoder = FrameDecoder::new();
-        assert_eq!(decoder.push(bytes), bytes.len());
-        decoder.next_frame().expect("a whole frame")
+        FrameDecoder::new().read(&mut &*bytes).expect("a whole frame")
     }
 
     #[test]

@@ -123,12 +123,8 @@ impl Vehicle {
         let (mut buffer, mut ids) = ([0; 2048], Vec::new());
         let Ok(length) = rustix::io::read(&self.line, &mut buffer) else { return Ok(ids) };
         let mut bytes = &buffer[..length];
-        while !bytes.is_empty() {
-            let taken = self.decoder.push(bytes);
-            bytes = &bytes[taken..];
-            while let Some(frame) = self.decoder.next_frame() {
-                ids.push(frame.message_id);
-            }
+        while let Some(frame) = self.decoder.read(&mut bytes) {
+            ids.push(frame.message_id);
         }
         Ok(ids)
     }

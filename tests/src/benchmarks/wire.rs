@@ -32,13 +32,9 @@ fn decode(stream: &[u8]) -> usize {
     let mut decoder = FrameDecoder::new();
     let mut found = 0;
     for mut read in stream.chunks(READ_BYTES) {
-        while !read.is_empty() {
-            let taken = decoder.push(read);
-            read = &read[taken..];
-            while let Some(frame) = decoder.next_frame() {
-                let _ = black_box(Message::decode(&frame));
-                found += 1;
-            }
+        while let Some(frame) = decoder.read(&mut read) {
+            let _ = black_box(Message::decode(&frame));
+            found += 1;
         }
     }
     found

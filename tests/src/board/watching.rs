@@ -21,10 +21,7 @@ pub struct Heard {
 pub fn heard(journal: &Journal, component: u8, message_id: u32) -> Vec<Heard> {
     let mut found = Vec::new();
     for (at, bytes) in journal.frames() {
-        let mut decoder = FrameDecoder::new();
-        // One frame: the decoder accepts all of it.
-        let _ = decoder.push(bytes);
-        let frame = decoder.next_frame();
+        let frame = FrameDecoder::new().read(&mut &*bytes);
         let wanted = |frame: &Frame| frame.sender.component == component && frame.message_id == message_id;
         found.extend(frame.filter(wanted).map(|frame| Heard { at, frame }));
     }

@@ -54,18 +54,14 @@ impl Heard {
         }
     }
 
-    fn read_link(&mut self, decoder: &mut FrameDecoder, mut rest: &[u8]) {
-        while !rest.is_empty() {
-            let taken = decoder.push(rest);
-            rest = &rest[taken..];
-            while let Some(frame) = decoder.next_frame() {
-                let Ok(Some(Message::Heartbeat(heartbeat))) = Message::decode(&frame) else { continue };
-                let firmware = Firmware::from_wire(heartbeat.autopilot);
-                if firmware_name(firmware).is_some() {
-                    self.autopilot.get_or_insert((firmware, frame.sender.system));
-                }
-                self.station |= heartbeat.vehicle == GROUND_STATION;
+    fn read_link(&mut self, decoder: &mut FrameDecoder, mut bytes: &[u8]) {
+        while let Some(frame) = decoder.read(&mut bytes) {
+            let Ok(Some(Message::Heartbeat(heartbeat))) = Message::decode(&frame) else { continue };
+            let firmware = Firmware::from_wire(heartbeat.autopilot);
+            if firmware_name(firmware).is_some() {
+                self.autopilot.get_or_insert((firmware, frame.sender.system));
             }
+            self.station |= heartbeat.vehicle == GROUND_STATION;
         }
         self.frames = decoder.stats().frames;
     }

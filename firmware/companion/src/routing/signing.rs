@@ -99,9 +99,9 @@ impl SignedPort {
     pub fn check(&mut self, packet: &Packet) -> bool {
         self.signing.set_clock(wall_time());
         // A whole packet of a known message is one frame for the decoder; an unknown one cannot be verified.
-        let taken = self.decoder.push(&packet.bytes);
-        let frame = self.decoder.next_frame();
-        taken == packet.bytes.len() && frame.is_some_and(|frame| self.signing.check(&frame).is_ok())
+        let mut rest = &packet.bytes[..];
+        let frame = self.decoder.read(&mut rest);
+        rest.is_empty() && frame.is_some_and(|frame| self.signing.check(&frame).is_ok())
     }
 
     /// The packet with a signature. `None`: it must not be sent on this port.

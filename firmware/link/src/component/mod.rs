@@ -110,15 +110,8 @@ impl Component {
 
     /// Takes in bytes of a stream: a serial line or a TCP connection.
     pub fn receive(&mut self, now: Instant, mut bytes: &[u8]) {
-        loop {
-            let taken = self.decoder.push(bytes);
-            bytes = bytes.get(taken..).unwrap_or(&[]);
-            while let Some(frame) = self.decoder.next_frame() {
-                self.receive_frame(now, &frame);
-            }
-            if bytes.is_empty() {
-                return;
-            }
+        while let Some(frame) = self.decoder.read(&mut bytes) {
+            self.receive_frame(now, &frame);
         }
     }
 

@@ -88,10 +88,33 @@ impl FrameDecoder {
         (self.start, self.end, self.newest, self.to_skip, self.in_order) = (0, 0, 0, 0, true);
     }
 
+    /// The next frame in what is left of `bytes`. `None` when all of them are taken in and more are needed.
+    ///
+    /// ```
+    /// # use gleaner_link::FrameDecoder;
+    /// # fn handle(frame: &gleaner_link::Frame) {}
+    /// # let (mut decoder, received) = (FrameDecoder::new(), [0xFD, 1, 2]);
+    /// let mut bytes = &received[..];
+    /// while let Some(frame) = decoder.read(&mut bytes) {
+    ///     handle(&frame);
+    /// }
+    /// ```
+    pub fn read(&mut self, bytes: &mut &[u8]) -> Option<Frame> {
+        loop {
+            if let Some(frame) = self.next_frame() {
+                return Some(frame);
+            }
+            if bytes.is_empty() {
+                return None;
+            }
+            let taken = self.push(bytes);
+            *bytes = bytes.get(taken..).unwrap_or(&[]);
+        }
+    }
+
     /// Takes in bytes and returns how many. Less than all when the buffer is full; after
     /// [`FrameDecoder::next_frame`] has returned `None` there is always room for some.
-    #[must_use]
-    pub fn push(&mut self, bytes: &[u8]) -> usize {
+    fn push(&mut self, bytes: &[u8]) -> usize {
         let skipped = self.to_skip.min(bytes.len());
         self.to_skip -= skipped;
         self.count_garbage(skipped);
@@ -107,8 +130,8 @@ impl FrameDecoder {
         skipped + taken
     }
 
-    /// The next frame, `None` when more bytes are needed.
-    pub fn next_frame(&mut self) -> Option<Frame> {
+    /// The next frame in the buffer, `None` when more bytes are needed.
+    fn next_frame(&mut self) -> Option<Frame> {
         loop {
             let held = self.buffer.get(self.start..self.end)?;
             match judge(held) {

@@ -52,15 +52,12 @@ impl Packet {
         let [id0, id1, id2, _] = self.message_id.to_le_bytes();
         let header = [MAGIC_V2, used as u8, 0, 0, sequence, sender.system, sender.component, id0, id1, id2];
         let mut frame = FrameBytes::new();
-        let body = self.payload.iter().copied().chain([0]).take(used);
         // `FrameBytes` has room for the longest frame, so nothing is cut off here.
-        for byte in header.into_iter().chain(body) {
-            let _ = frame.push(byte);
-        }
+        let _ = frame.extend_from_slice(&header);
+        // An empty payload is sent as one zero.
+        let _ = frame.extend_from_slice(self.payload.get(..used).unwrap_or(&[0]));
         let checksum = mavlink::calculate_crc(frame.get(1..).unwrap_or(&[]), self.extra_crc);
-        for byte in checksum.to_le_bytes() {
-            let _ = frame.push(byte);
-        }
+        let _ = frame.extend_from_slice(&checksum.to_le_bytes());
         frame
     }
 }

@@ -20,16 +20,12 @@ fn decode_chunked(wire: &[u8], chunk: usize) -> (Vec<Frame>, FrameDecoder) {
     let mut decoder = FrameDecoder::new();
     let mut found = Vec::new();
     for mut bytes in wire.chunks(chunk) {
-        while !bytes.is_empty() {
-            let taken = decoder.push(bytes);
-            assert!(taken > 0, "a drained decoder takes bytes");
-            bytes = &bytes[taken..];
+        while let Some(mut frame) = decoder.read(&mut bytes) {
             // When a frame was found is another question than which frames were found.
-            while let Some(mut frame) = decoder.next_frame() {
-                frame.late = false;
-                found.push(frame);
-            }
+            frame.late = false;
+            found.push(frame);
         }
+        assert!(bytes.is_empty(), "all bytes are taken in");
     }
     (found, decoder)
 }
@@ -44,11 +40,10 @@ fn a_frame_that_waited_behind_a_damaged_one_is_late() {
     damaged[1] = 200;
     let mut decoder = FrameDecoder::new();
     let early = [damaged.as_slice(), &heartbeat].concat();
-    assert_eq!(decoder.push(&early), early.len());
-    assert!(decoder.next_frame().is_none(), "the damaged frame may still be whole");
+    assert!(decoder.read(&mut &*early).is_none(), "the damaged frame may still be whole");
     let rest = heartbeat.repeat(12);
-    assert_eq!(decoder.push(&rest), rest.len());
-    let late: Vec<bool> = std::iter::from_fn(|| decoder.next_frame()).map(|frame| frame.late).collect();
+    let mut rest = &rest[..];
+    let late: Vec<bool> = std::iter::from_fn(|| decoder.read(&mut rest)).map(|frame| frame.late).collect();
     assert_eq!((late[0], late[1]), (true, false), "{late:?}");
 }
 

@@ -17,14 +17,8 @@ pub fn golden(name: &str) -> Vec<u8> {
 /// All frames in `bytes`, which must contain nothing else.
 pub fn frames(bytes: &[u8]) -> Vec<Frame> {
     let mut decoder = FrameDecoder::new();
-    let mut frames = Vec::new();
     let mut rest = bytes;
-    while !rest.is_empty() {
-        rest = &rest[decoder.push(rest)..];
-        while let Some(frame) = decoder.next_frame() {
-            frames.push(frame);
-        }
-    }
+    let frames = std::iter::from_fn(|| decoder.read(&mut rest)).collect();
     assert_eq!(decoder.stats().garbage_bytes, 0);
     frames
 }

@@ -170,12 +170,9 @@ impl Bench {
                 return;
             }
             let mut bytes = &buffer[..used];
-            while !bytes.is_empty() {
-                bytes = &bytes[self.decoder.push(bytes)..];
-                while let Some(frame) = self.decoder.next_frame() {
-                    self.obey(&frame);
-                    self.sent.push(frame);
-                }
+            while let Some(frame) = self.decoder.read(&mut bytes) {
+                self.obey(&frame);
+                self.sent.push(frame);
             }
         }
     }

@@ -43,17 +43,8 @@ impl Ports {
 
     /// Takes bytes until one frame is complete: the rest of the bytes, and the frame.
     pub fn receive<'b>(&mut self, link: LinkId, mut bytes: &'b [u8]) -> (&'b [u8], Option<Frame>) {
-        let decoder = &mut self.ports[link.0].decoder;
-        loop {
-            if let Some(frame) = decoder.next_frame() {
-                return (bytes, Some(frame));
-            }
-            if bytes.is_empty() {
-                return (bytes, None);
-            }
-            let taken = decoder.push(bytes);
-            bytes = &bytes[taken..];
-        }
+        let frame = self.ports[link.0].decoder.read(&mut bytes);
+        (bytes, frame)
     }
 
     /// Passes a frame on. Whether it is (also) addressed to the autopilot.

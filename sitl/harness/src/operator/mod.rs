@@ -124,12 +124,8 @@ impl Operator {
 
     /// Bytes from the vehicle.
     pub fn receive(&mut self, now: Instant, mut bytes: &[u8]) {
-        while !bytes.is_empty() {
-            let taken = self.decoder.push(bytes);
-            bytes = &bytes[taken..];
-            while let Some(frame) = self.decoder.next_frame() {
-                self.take_frame(now, &frame);
-            }
+        while let Some(frame) = self.decoder.read(&mut bytes) {
+            self.take_frame(now, &frame);
         }
     }
 

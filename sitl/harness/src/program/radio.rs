@@ -120,14 +120,10 @@ impl Follower {
     }
 
     fn read(&mut self, mut bytes: &[u8]) {
-        while !bytes.is_empty() {
-            let taken = self.decoder.push(bytes);
-            bytes = &bytes[taken..];
-            while let Some(frame) = self.decoder.next_frame() {
-                if let Some(position) = parse::<GLOBAL_POSITION_INT_DATA>(&frame) {
-                    self.system = frame.sender.system;
-                    self.follow(GeoPoint { lat_deg_e7: position.lat, lon_deg_e7: position.lon });
-                }
+        while let Some(frame) = self.decoder.read(&mut bytes) {
+            if let Some(position) = parse::<GLOBAL_POSITION_INT_DATA>(&frame) {
+                self.system = frame.sender.system;
+                self.follow(GeoPoint { lat_deg_e7: position.lat, lon_deg_e7: position.lon });
             }
         }
     }

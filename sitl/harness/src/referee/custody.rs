@@ -85,13 +85,7 @@ impl Noise {
         }
         self.bytes_left = self.bytes_left.saturating_sub(bytes.len());
         let mut rest = bytes;
-        while !rest.is_empty() {
-            let taken = self.receiver.push(rest);
-            rest = &rest[taken..];
-            while let Some(frame) = self.receiver.next_frame() {
-                frames.push(frame);
-            }
-        }
+        frames.extend(std::iter::from_fn(|| self.receiver.read(&mut rest)));
         if self.bytes_left == 0 {
             self.receiver = FrameDecoder::new();
         }
@@ -145,10 +139,7 @@ impl Custody {
         {
             return;
         }
-        let mut decoder = FrameDecoder::new();
-        // A frame is shorter than the decoder's buffer.
-        let _ = decoder.push(bytes);
-        if let Some(frame) = decoder.next_frame() {
+        if let Some(frame) = FrameDecoder::new().read(&mut &*bytes) {
             self.received(left_at, &frame);
         }
     }
