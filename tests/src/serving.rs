@@ -4,10 +4,6 @@ use crate::programs::{Running, repository};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// The vehicle runs five times as fast as the wall clock, so that a take-off takes six seconds. The pilot keeps wall
-/// time, as always.
-const SPEED: &str = "5";
-
 /// Kind of the autopilot's line.
 #[derive(Clone, Copy, Debug)]
 pub enum Link {
@@ -28,12 +24,22 @@ pub struct Serving {
 }
 
 impl Serving {
-    /// Starts RD with the realization of seed 3; `more` are further arguments of `serve`.
+    /// Starts RD with the realization of seed 3; `more` are further arguments of `serve`. The vehicle runs five times as fast
+    /// as the wall clock, so that a take-off takes six seconds. The pilot keeps wall time, as always.
     ///
     /// # Panics
     /// When a program cannot be started or ends early.
     #[must_use]
     pub fn start(link: Link, more: &[&str]) -> Serving {
+        Serving::at_speed("5", link, more)
+    }
+
+    /// The same with a vehicle that runs `speed` times as fast.
+    ///
+    /// # Panics
+    /// See [`Serving::start`].
+    #[must_use]
+    pub fn at_speed(speed: &str, link: Link, more: &[&str]) -> Serving {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
         let (mission, out, log) = (at("mission.toml"), at("flight"), at("log"));
@@ -42,7 +48,7 @@ impl Serving {
             Link::Tcp => (any, "tcpout"),
             Link::Udp => ("udpin:127.0.0.1:0", "udpout"),
         };
-        let mut words = vec!["serve", "--scenario", "rd", "--seed", "3", "--speed", SPEED];
+        let mut words = vec!["serve", "--scenario", "rd", "--seed", "3", "--speed", speed];
         words.extend(["--companion", listen, "--radio", any, "--gcs", "udpin:127.0.0.1:0"]);
         words.extend(["--mission-out", &mission, "--out", &out]);
         words.extend(more);

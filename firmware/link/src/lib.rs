@@ -87,6 +87,7 @@ pub use signing::{
     may_forward,
 };
 pub use telemetry::Telemetry;
+pub use wire::checksum::checksum;
 pub use wire::decoder::{DecodeStats, FrameDecoder};
 pub use wire::frame::{Frame, MAX_FRAME_BYTES, MAX_PAYLOAD_BYTES, SIGNATURE_BYTES, WireVersion};
 pub use wire::outgoing::{Outgoing, OutgoingStats, Priority};

@@ -7,6 +7,9 @@ use super::writer::{LogWriter, NewsSender};
 use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
+/// Packets of this time are written at once: ten writes a second instead of one per packet.
+const GATHER: Duration = Duration::from_millis(100);
+
 /// The open log.
 pub struct TelemetryLog {
     writer: LogWriter,
@@ -20,7 +23,7 @@ impl TelemetryLog {
     pub fn open(folder: &Path, limits: Limits, news: NewsSender) -> Result<TelemetryLog, LogError> {
         let file = RotatingFile::open(folder, "flight", "tlog", limits, true)
             .map_err(|source| LogError { path: folder.join("flight.tlog"), source })?;
-        Ok(TelemetryLog { writer: LogWriter::start("telemetry log", file, b"", news) })
+        Ok(TelemetryLog { writer: LogWriter::start("telemetry log", file, b"", GATHER, news) })
     }
 
     /// Hands one packet to the writer. Never waits.

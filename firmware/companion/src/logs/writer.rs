@@ -3,9 +3,10 @@
 use super::rotation::RotatingFile;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
-/// Records that wait for a slow disk: minutes of decisions, seconds of telemetry.
-const RECORDS_WAITING: usize = 1024;
+/// Records that wait for a slow disk: hours of decisions, a minute of telemetry, most of a second of a flood.
+const RECORDS_WAITING: usize = 8192;
 
 /// A change that is reported to the operator. The flight continues in every case.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,17 +33,19 @@ pub struct LogWriter {
 }
 
 impl LogWriter {
-    /// Starts the thread. After a failure `repair` goes before the next record, for example to end half a line.
+    /// Starts the thread. After a failure `repair` goes before the next record, for example to end half a line. Records
+    /// that follow one within `gather` are written with it at once: the price is that a killed program loses them.
     pub fn start(
         name: &'static str,
         file: RotatingFile,
         repair: &'static [u8],
+        gather: Duration,
         news: NewsSender,
     ) -> LogWriter {
         let (records, waiting) = sync_channel(RECORDS_WAITING);
         let thread = {
             let news = news.clone();
-            std::thread::spawn(move || write_all(name, &waiting, file, repair, &news))
+            std::thread::spawn(move || write_all(name, &waiting, file, repair, gather, &news))
         };
         LogWriter { name, records, thread, news, overflowed: false }
     }
@@ -73,11 +76,19 @@ fn write_all(
     records: &Receiver<Vec<u8>>,
     mut file: RotatingFile,
     repair: &[u8],
+    gather: Duration,
     news: &NewsSender,
 ) {
     let mut recovery = Recovery { name, lost: 0 };
-    for record in records {
-        recovery.write(&record, repair, news, |bytes| file.write(bytes));
+    while let Ok(mut batch) = records.recv() {
+        // The receiver waits for no record meanwhile, so that handing one over wakes no thread.
+        std::thread::sleep(gather);
+        let mut count = 1;
+        for record in records.try_iter() {
+            batch.extend(record);
+            count += 1;
+        }
+        recovery.write(&batch, count, repair, news, |bytes| file.write(bytes));
     }
     if recovery.lost > 0 {
         tracing::error!("{name}: {} records were not written", recovery.lost);
@@ -91,20 +102,23 @@ struct Recovery {
 }
 
 impl Recovery {
+    /// Writes `count` records.
     fn write(
         &mut self,
-        record: &[u8],
+        records: &[u8],
+        count: u64,
         repair: &[u8],
         news: &NewsSender,
         mut write: impl FnMut(&[u8]) -> std::io::Result<()>,
     ) {
-        let written = if self.lost > 0 { write(&[repair, record].concat()) } else { write(record) };
+        let written = if self.lost > 0 { write(&[repair, records].concat()) } else { write(records) };
         let report = match written {
             Ok(()) if self.lost > 0 => LogNews::Writing(self.name, std::mem::take(&mut self.lost)),
             Ok(()) => return,
             Err(error) => {
-                self.lost += 1;
-                if self.lost > 1 {
+                let is_first = self.lost == 0;
+                self.lost += count;
+                if !is_first {
                     return;
                 }
                 LogNews::Failing(self.name, error.to_string())
@@ -127,7 +141,7 @@ mod tests {
         let (mut disk, mut room) = (Vec::new(), 8);
         let mut record = |bytes: &[u8], more: usize| {
             room += more;
-            recovery.write(bytes, b"\n", &news, |bytes| {
+            recovery.write(bytes, 1, b"\n", &news, |bytes| {
                 let fits = bytes.len().min(room);
                 room -= fits;
                 disk.extend_from_slice(&bytes[..fits]);

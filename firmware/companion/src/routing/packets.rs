@@ -3,8 +3,9 @@
 //! The pilot's own decoder hands out the messages that the pilot needs. A router also forwards messages that it does
 //! not know, with their signature.
 
+use gleaner_link::checksum;
 use mavlink::dialects::ardupilotmega::MavMessage;
-use mavlink::{MavlinkVersion, Message as _, calculate_crc};
+use mavlink::{MavlinkVersion, Message as _};
 
 const MAGIC_V1: u8 = 0xFE;
 const MAGIC_V2: u8 = 0xFD;
@@ -137,7 +138,7 @@ fn front(held: &[u8]) -> Front {
     let extra = MavMessage::extra_crc(message_id);
     let verified = extra != 0;
     if verified {
-        let expected = calculate_crc(&bytes[1..checked], extra).to_le_bytes();
+        let expected = checksum(&bytes[1..checked], extra).to_le_bytes();
         if bytes[checked..checked + CHECKSUM] != expected {
             return Front::Damaged;
         }

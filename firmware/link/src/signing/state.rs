@@ -2,6 +2,7 @@
 
 use super::key::SigningTime;
 use crate::address::Address;
+use crate::wire::checksum::checksum;
 use core::fmt;
 use heapless::Vec;
 
@@ -71,8 +72,8 @@ impl SigningState {
             put(&[stream.sender.system, stream.sender.component, stream.link_id]);
             put(&stream.last.bytes());
         }
-        let checksum = mavlink::calculate_crc(&bytes, 0);
-        let _ = bytes.extend_from_slice(&checksum.to_le_bytes());
+        let sum = checksum(&bytes, 0);
+        let _ = bytes.extend_from_slice(&sum.to_le_bytes());
         bytes
     }
 
@@ -81,7 +82,7 @@ impl SigningState {
     /// # Errors
     /// See [`StateError`]. Do not go on without a state then: replays would be accepted.
     pub fn from_bytes(bytes: &[u8]) -> Result<SigningState, StateError> {
-        let (body, &checksum) = bytes.split_last_chunk::<2>().ok_or(StateError::Length)?;
+        let (body, &sum) = bytes.split_last_chunk::<2>().ok_or(StateError::Length)?;
         let (&[version, n0, n1, n2, n3, n4, n5, count], rest) =
             body.split_first_chunk::<8>().ok_or(StateError::Length)?;
         if version != VERSION {
@@ -90,7 +91,7 @@ impl SigningState {
         if rest.len() != 9 * usize::from(count) || usize::from(count) > SigningState::STREAMS {
             return Err(StateError::Length);
         }
-        if mavlink::calculate_crc(body, 0) != u16::from_le_bytes(checksum) {
+        if checksum(body, 0) != u16::from_le_bytes(sum) {
             return Err(StateError::Checksum);
         }
         let newest = SigningTime::from_bytes([n0, n1, n2, n3, n4, n5]);

@@ -2,6 +2,7 @@
 
 use super::key::{SigningKey, SigningTime};
 use super::state::{SigningState, Stream};
+use crate::wire::checksum::{checksum, extra_crc};
 use crate::wire::frame::{CHECKSUM, FLAG_SIGNED, Frame, HEADER_V2, MAGIC_V2, MAX_FRAME_BYTES, WireVersion};
 use heapless::Vec;
 use mavlink::MessageData;
@@ -110,12 +111,13 @@ impl Signing {
         if magic != MAGIC_V2 || flags != 0 || frame.len() != checked + CHECKSUM {
             return None;
         }
-        let (body, checksum) = frame.split_at_checked(checked)?;
-        let extra = extra_crc(body, checksum)?;
+        let (body, sum) = frame.split_at_checked(checked)?;
+        // From frame and checksum, so that messages outside the dialect can be signed as well.
+        let extra = extra_crc(body.get(1..)?, u16::from_le_bytes(*sum.first_chunk()?))?;
         let mut signed = SignedFrameBytes::from_slice(body).ok()?;
         *signed.get_mut(2)? |= FLAG_SIGNED;
-        let checksum = mavlink::calculate_crc(signed.get(1..)?, extra);
-        signed.extend_from_slice(&checksum.to_le_bytes()).ok()?;
+        let sum = checksum(signed.get(1..)?, extra);
+        signed.extend_from_slice(&sum.to_le_bytes()).ok()?;
         self.state.newest = self.state.newest.next();
         let time = self.state.newest.bytes();
         let signature = self.key.signature(&[&signed, &[self.link_id], &time]);
@@ -185,14 +187,6 @@ impl Signing {
         let stream = Stream { sender: frame.sender, link_id, last: time };
         self.state.streams.push(stream).map_err(|_| SigningFault::TooManyStreams)
     }
-}
-
-/// The `CRC_EXTRA` byte with which the frame's checksum was made. It follows from frame and checksum, so messages
-/// outside the dialect can be signed as well.
-fn extra_crc(body: &[u8], checksum: &[u8]) -> Option<u8> {
-    let checksum = u16::from_le_bytes(*checksum.first_chunk()?);
-    let body = body.get(1..)?;
-    (0..=u8::MAX).find(|&extra| mavlink::calculate_crc(body, extra) == checksum)
 }
 
 fn count(counter: &mut u32) {

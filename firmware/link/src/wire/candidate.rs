@@ -1,5 +1,6 @@
 //! The bytes at one place of a stream: a frame, the start of one, or something else.
 
+use super::checksum::checksum;
 use super::frame::{
     CHECKSUM, FLAG_SIGNED, Frame, HEADER_V1, HEADER_V2, MAGIC_V1, MAGIC_V2, SIGNATURE_BYTES, WireVersion,
 };
@@ -22,7 +23,6 @@ pub enum Rejected {
 }
 
 /// Verdict on the bytes from the first one on.
-#[expect(clippy::large_enum_variant, reason = "there is no heap to box a frame on")]
 pub enum Candidate {
     /// More bytes are needed.
     Incomplete,
@@ -35,8 +35,8 @@ pub enum Candidate {
         /// Bytes that the header claims, signature included.
         length: usize,
     },
-    /// A frame and its length on the wire.
-    Frame(Frame, usize),
+    /// A whole packet whose checksum is right.
+    Packet(Packet),
 }
 
 /// Whether `byte` begins frames.
@@ -71,7 +71,7 @@ fn judge_v1(held: &[u8]) -> Candidate {
         compatibility: 0,
         signed: false,
     };
-    header.verify(held, HEADER_V1, usize::from(length))
+    header.verify(held, usize::from(length))
 }
 
 /// MAVLink 2: magic, length, incompatibility flags, compatibility flags, sequence, system, component, id (3).
@@ -91,7 +91,7 @@ fn judge_v2(held: &[u8]) -> Candidate {
     }
     let sender = Address::new(system, component);
     let header = Header { sender, sequence, message_id, version: WireVersion::V2, compatibility, signed };
-    header.verify(held, HEADER_V2, usize::from(length))
+    header.verify(held, usize::from(length))
 }
 
 /// Payload length of the MAVLink 1 messages that are needed. Noise often resembles a MAVLink 1 header, which has an id of
@@ -131,8 +131,15 @@ struct Header {
 }
 
 impl Header {
-    fn verify(self, held: &[u8], header_bytes: usize, payload_bytes: usize) -> Candidate {
-        let checked = header_bytes + payload_bytes;
+    const fn bytes(&self) -> usize {
+        match self.version {
+            WireVersion::V1 => HEADER_V1,
+            WireVersion::V2 => HEADER_V2,
+        }
+    }
+
+    fn verify(self, held: &[u8], payload_bytes: usize) -> Candidate {
+        let checked = self.bytes() + payload_bytes;
         let unsigned = checked + CHECKSUM;
         let length = unsigned + if self.signed { SIGNATURE_BYTES } else { 0 };
         let (Some(body), Some(&[low, high]), true) =
@@ -140,24 +147,41 @@ impl Header {
         else {
             return Candidate::Incomplete;
         };
-        let checksum = u16::from_le_bytes([low, high]);
-        if mavlink::calculate_crc(body, MavMessage::extra_crc(self.message_id)) != checksum {
+        let sent = u16::from_le_bytes([low, high]);
+        if checksum(body, MavMessage::extra_crc(self.message_id)) != sent {
             return Candidate::Rejected { reason: Rejected::Checksum, length };
         }
-        let signature = held.get(unsigned..length).and_then(|bytes| bytes.first_chunk().copied());
-        let payload = held.get(header_bytes..checked).unwrap_or(&[]);
-        let frame = Frame {
-            sender: self.sender,
-            sequence: self.sequence,
-            message_id: self.message_id,
-            version: self.version,
-            compatibility: self.compatibility,
+        Candidate::Packet(Packet { header: self, checksum: sent, checked, length })
+    }
+}
+
+/// A packet in the bytes that were judged.
+pub struct Packet {
+    header: Header,
+    checksum: u16,
+    /// Bytes of header and payload.
+    checked: usize,
+    /// Bytes on the wire.
+    pub length: usize,
+}
+
+impl Packet {
+    /// The frame, from the bytes that were judged.
+    pub fn frame(self, held: &[u8], late: bool) -> Frame {
+        let Packet { header, checksum, checked, length } = self;
+        let payload = held.get(header.bytes()..checked).unwrap_or(&[]);
+        let signature = held.get(checked + CHECKSUM..length).and_then(|bytes| bytes.first_chunk().copied());
+        Frame {
+            sender: header.sender,
+            sequence: header.sequence,
+            message_id: header.message_id,
+            version: header.version,
+            compatibility: header.compatibility,
             checksum,
             signature,
-            late: false,
+            late,
             payload: Vec::from_slice(payload).unwrap_or_default(),
-        };
-        Candidate::Frame(frame, length)
+        }
     }
 }
 

@@ -146,9 +146,10 @@ impl FrameDecoder {
                         return None;
                     }
                 }
-                Candidate::Frame(mut frame, length) => {
-                    self.start += length;
-                    frame.late = self.start <= self.newest;
+                Candidate::Packet(packet) => {
+                    let end = self.start + packet.length;
+                    let frame = packet.frame(held, end <= self.newest);
+                    self.start = end;
                     self.in_order = true;
                     count(&mut self.stats.frames);
                     if frame.signature.is_some() {

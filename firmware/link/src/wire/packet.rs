@@ -1,5 +1,6 @@
 //! Messages to send, and their framing.
 
+use super::checksum::checksum;
 use super::frame::{CHECKSUM, HEADER_V2, MAGIC_V2, MAX_PAYLOAD_BYTES};
 use crate::address::Address;
 use heapless::Vec;
@@ -56,8 +57,8 @@ impl Packet {
         let _ = frame.extend_from_slice(&header);
         // An empty payload is sent as one zero.
         let _ = frame.extend_from_slice(self.payload.get(..used).unwrap_or(&[0]));
-        let checksum = mavlink::calculate_crc(frame.get(1..).unwrap_or(&[]), self.extra_crc);
-        let _ = frame.extend_from_slice(&checksum.to_le_bytes());
+        let sum = checksum(frame.get(1..).unwrap_or(&[]), self.extra_crc);
+        let _ = frame.extend_from_slice(&sum.to_le_bytes());
         frame
     }
 }

@@ -41,6 +41,14 @@ const MAH_PERCENT: f32 = 0.5;
 /// Margin on a learned price that is not nominal: gusts and braking make the last cells and the descent that much dearer than the
 /// mean of those before.
 const MARGIN: f32 = 1.05;
+/// What the margin grows by per price above nominal. In a strong wind the courses differ most, and the way home is one that was
+/// seldom flown.
+const MARGIN_SLOPE: f32 = 0.15;
+
+/// A learned price with its margin.
+fn with_margin(price: f32) -> f32 {
+    price * (MARGIN + MARGIN_SLOPE * (price - 1.0).max(0.0))
+}
 
 /// What a new percentage means. A jump teaches nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,7 +185,7 @@ impl Burn {
     /// a change that cells showed since, so it is at least the mean of the window.
     pub(crate) fn descent_price(&self) -> f32 {
         let price = self.learned().hover.max(self.prices.mean());
-        if price > NOISE { price * MARGIN } else { price.max(1.0) }
+        if price > NOISE { with_margin(price) } else { price.max(1.0) }
     }
 
     /// The price of a nominal unit of hovering as it was learned from hovering, without a margin: what the landing will probably
@@ -206,7 +214,7 @@ impl Burn {
         }
         let Price { cell, hover, .. } = self.learned();
         let dearest = cell.max(hover * slot / 0.5);
-        if dearest > NOISE { dearest * MARGIN } else { 1.0 }
+        if dearest > NOISE { with_margin(dearest) } else { 1.0 }
     }
 
     /// Units that the way home takes for its course, beyond `price` for each of its cells: what the wind against it adds.
@@ -216,11 +224,11 @@ impl Burn {
     /// wind, it gets back.
     pub(crate) fn headwind(&self, cells: f32, net: [f32; 2], price: f32) -> f32 {
         let with_wind = self.prices.solve_with_wind();
-        if with_wind.net == [0.0; 2] {
+        if with_wind.net == [0.0; 2] || cells < 1.0 {
             return 0.0;
         }
-        let needed = (with_wind.cell * cells + with_wind.of_net(net)) * MARGIN;
-        (needed - price * cells).max(0.0)
+        let mean = with_wind.cell + with_wind.of_net(net) / cells;
+        ((with_margin(mean) - price) * cells).max(0.0)
     }
 }
 
@@ -318,7 +326,7 @@ mod tests {
             fly(&mut burn, price, 8.0);
             assert!(burn.price(2.0) > 0.85 * price, "{} for {price}", burn.price(2.0));
             fly(&mut burn, price, 20.0);
-            assert!(burn.price(2.0) < 1.15 * price, "{} for {price}", burn.price(2.0));
+            assert!(burn.price(2.0) < 1.1 * with_margin(price), "{} for {price}", burn.price(2.0));
         }
     }
 

@@ -4,8 +4,9 @@ use crate::flight::burn::{Burn, HOVER_UNITS_PER_S, Reading};
 use crate::scene::Scene;
 use gleaner_units::{Action, BatteryUnits, Cell};
 
-/// Descending takes less than hovering: ArduCopter used 12.7 units of 100 in 57 s.
-const DESCENT_SHARE: f32 = 0.9;
+/// What descending takes less than hovering: ArduCopter used 12.7 units of 100 in 57 s. It is saved in the rotors, so that it
+/// does not grow with what the wind takes.
+const DESCENT_SAVING: f32 = 0.1;
 
 /// The account of one mission.
 ///
@@ -122,13 +123,13 @@ impl Energy {
         let full = scene.inputs.parameters.full_battery();
         let left = scene.vehicle().battery_percent.map(|percent| charge(percent, full));
         // Without the margins of a plan: the terminal may be one cell away.
-        let landing = descent_units(scene) * self.burn.hover_price();
+        let landing = descent_units(scene, self.burn.hover_price());
         left.is_some_and(|left| left.0 < landing + self.burn.learned().cell)
     }
 
     /// Units that the landing takes, from the flight altitude at the descent rate of the autopilot.
     fn landing(&self, scene: &Scene<'_>) -> BatteryUnits {
-        BatteryUnits(descent_units(scene) * self.burn.descent_price())
+        BatteryUnits(descent_units(scene, self.burn.descent_price()))
     }
 
     /// Nominal units behind a percentage: less the landing and the wind against the way home, at the learned price.
@@ -146,10 +147,10 @@ impl Energy {
     }
 }
 
-/// Nominal units of descent and landing.
-fn descent_units(scene: &Scene<'_>) -> f32 {
+/// Units of descent and landing at this price of a nominal unit of hovering.
+fn descent_units(scene: &Scene<'_>, hover_price: f32) -> f32 {
     let secs = scene.inputs.parameters.altitude().0 / scene.inputs.rules.descent_rate.0.max(0.1);
-    secs * HOVER_UNITS_PER_S * DESCENT_SHARE
+    secs * HOVER_UNITS_PER_S * (hover_price - DESCENT_SAVING)
 }
 
 /// Battery units behind a percentage.
