@@ -61,6 +61,20 @@ pub enum CityFault {
     Grid(GridError),
 }
 
+/// The beginning of a value on one line: a quoted value may contain line breaks and be as long as the file.
+struct Excerpt<'a>(&'a str);
+
+impl fmt::Display for Excerpt<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const CHARACTERS: usize = 40;
+        let mut characters = self.0.chars();
+        for character in characters.by_ref().take(CHARACTERS) {
+            write!(f, "{}", character.escape_debug())?;
+        }
+        if characters.next().is_some() { f.write_str("...") } else { Ok(()) }
+    }
+}
+
 impl fmt::Display for CityFileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.line > 0 {
@@ -74,10 +88,10 @@ impl fmt::Display for CityFileError {
             }
             CityFault::Empty => write!(f, "empty cell: write 0 for open ground"),
             CityFault::NoData(value) => {
-                write!(f, "no-data value {value}: fill in the height, 0 for open ground")
+                write!(f, "no-data value {}: fill in the height, 0 for open ground", Excerpt(value))
             }
-            CityFault::NotANumber(value) => write!(f, "\"{value}\" is no height in metres"),
-            CityFault::OutOfRange(value) => write!(f, "height {value} is not from 0 to 255 m"),
+            CityFault::NotANumber(value) => write!(f, "\"{}\" is no height in metres", Excerpt(value)),
+            CityFault::OutOfRange(value) => write!(f, "height {} is not from 0 to 255 m", Excerpt(value)),
             CityFault::RowLength { expected, found } => {
                 write!(f, "{found} values where the first row has {expected}")
             }
@@ -258,6 +272,10 @@ mod tests {
         assert_eq!(fault("0,-9999\n"), (1, 2, CityFault::NoData("-9999".into())));
         assert_eq!(fault("0,nan\n"), (1, 2, CityFault::NoData("nan".into())));
         assert_eq!(fault("0,x\n"), (1, 2, CityFault::NotANumber("x".into())));
+        let told = |text: &str| read_city(text.as_bytes(), Metres(20.0)).unwrap_err().to_string();
+        assert_eq!(told("0,\"a\nb\"\n"), "line 1, column 2: \"a\\nb\" is no height in metres");
+        let long = told(&std::format!("0,-{}\n", "7".repeat(5_000)));
+        assert!(long.len() < 100 && long.contains("777..."), "{long}");
         assert_eq!(fault("0,256\n"), (1, 2, CityFault::OutOfRange("256".into())));
         assert_eq!(fault("0,-3\n"), (1, 2, CityFault::OutOfRange("-3".into())));
         assert_eq!(fault("0,0\n0\n"), (2, 2, CityFault::RowLength { expected: 2, found: 1 }));

@@ -7,6 +7,7 @@ use crate::event::{Event, OperatorRequest};
 use crate::message::{Command, CommandResult, Message, ParameterKey, ParameterName, Severity};
 use crate::parameters::{Change, Enable, ParameterError, ParameterId, decode};
 use crate::service::commands::{Effect, Refusal, Requested, Title, judge, needs_authority};
+use core::fmt;
 use gleaner_units::{Decimal, Duration, Instant};
 
 /// The names under which a ground station reads the checksum of a parameter cache (PX4).
@@ -76,12 +77,12 @@ impl Component {
             // Not remembered: the operator's next command is a new one, however soon it comes.
             Err(Refusal::Resent) => {
                 self.send_ack(command, Refusal::Resent.result());
-                self.report_refusal(command, Refusal::Resent);
+                self.report_refusal(now, command, Refusal::Resent);
             }
             Err(refusal) => {
                 self.send_ack(command, refusal.result());
                 self.answers.remember(now, *command, refusal.result());
-                self.report_refusal(command, refusal);
+                self.report_refusal(now, command, refusal);
             }
             // Its purpose is to be sent again when asked again, so it is not remembered.
             Ok(Effect::Send(requested)) => {
@@ -114,10 +115,23 @@ impl Component {
     }
 
     /// Ground stations try commands of all kinds on every component; only operators' commands are worth a text.
-    fn report_refusal(&mut self, command: &Command, refusal: Refusal) {
+    fn report_refusal(&mut self, now: Instant, command: &Command, refusal: Refusal) {
         if needs_authority(command) {
             let (title, sender) = (Title(command), command.sender);
-            self.say(Severity::Warning, format_args!("gleaner: {title} by {sender} refused: {refusal}"));
+            self.warn(now, sender, format_args!("gleaner: {title} by {sender} refused: {refusal}"));
+        }
+    }
+
+    /// Says what `sender` is refused. Of those who are no operators, not each.
+    fn warn(&mut self, now: Instant, sender: Address, text: fmt::Arguments<'_>) {
+        if self.operators.allow(sender) {
+            self.say(Severity::Warning, text);
+            return;
+        }
+        match self.strangers.admit(now) {
+            None => {}
+            Some(0) => self.say(Severity::Warning, text),
+            Some(unsaid) => self.say(Severity::Warning, format_args!("{text} ({unsaid} more)")),
         }
     }
 
@@ -187,7 +201,7 @@ impl Component {
         let is_exact = set.target == self.address();
         let Some(id) = ParameterId::from_name(set.name) else {
             if is_exact {
-                self.say(Severity::Warning, format_args!("gleaner: no parameter {}", set.name));
+                self.warn(now, set.sender, format_args!("gleaner: no parameter {}", set.name));
             }
             return;
         };
@@ -206,7 +220,7 @@ impl Component {
             count(&mut self.stats.not_allowed);
             if is_exact {
                 let reason = Refusal::NotAllowed;
-                self.say(Severity::Warning, format_args!("gleaner: {name} by {sender} refused: {reason}"));
+                self.warn(now, sender, format_args!("gleaner: {name} by {sender} refused: {reason}"));
             }
             return;
         }

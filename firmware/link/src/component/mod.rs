@@ -21,7 +21,7 @@ use crate::service::identity::Identity;
 use crate::service::parameters::ParameterService;
 use crate::service::requests::Requests;
 use crate::service::steering::Steering;
-use crate::service::texts::Texts;
+use crate::service::texts::{Strangers, Texts};
 use crate::setpoint::PositionTarget;
 use crate::settings::{EngageBlock, LinkStats, NotSent, Settings, Status};
 use crate::wire::decoder::FrameDecoder;
@@ -63,6 +63,7 @@ pub struct Component {
     answers: Answers,
     requests: Requests,
     texts: Texts,
+    strangers: Strangers,
     events: Events,
     owner: Status,
     steering: Steering,
@@ -94,6 +95,7 @@ impl Component {
             answers: Answers::default(),
             requests: Requests::default(),
             texts: Texts::default(),
+            strangers: Strangers::default(),
             events: Events::default(),
             owner: Status { state: SystemState::Boot, may_engage: false, may_return: false },
             steering: Steering::default(),

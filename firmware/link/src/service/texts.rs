@@ -32,6 +32,32 @@ pub(crate) struct Texts {
     pub dropped: u32,
 }
 
+/// Limits the texts that senders cause who are no operators: at ten a second these would displace the operator's own.
+#[derive(Debug, Default)]
+pub(crate) struct Strangers {
+    window_ends: Instant,
+    said: u8,
+    unsaid: u32,
+}
+
+impl Strangers {
+    const WINDOW: Duration = Duration::from_secs(10);
+    const TEXTS: u8 = 3;
+
+    /// Whether a text may be said now, and how many were not said since the last one.
+    pub fn admit(&mut self, now: Instant) -> Option<u32> {
+        if now >= self.window_ends {
+            (self.window_ends, self.said) = (now + Strangers::WINDOW, 0);
+        }
+        if self.said < Strangers::TEXTS {
+            self.said += 1;
+            return Some(core::mem::take(&mut self.unsaid));
+        }
+        self.unsaid = self.unsaid.saturating_add(1);
+        None
+    }
+}
+
 /// Writes as much as fits.
 struct Truncated<'a>(&'a mut String<LONGEST>);
 

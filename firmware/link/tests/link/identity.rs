@@ -143,6 +143,28 @@ fn a_broadcast_engages_nothing_and_gets_no_answer() {
     assert_eq!(values(&bench.sent()), [(3, 8.0)], "parameters that do not engage follow the routing rules");
 }
 
+/// A stranger that tries ten times a second must not hide what the operator is told.
+#[test]
+fn refusals_of_a_stranger_leave_room_for_the_operators_texts() {
+    let mut bench = Bench::connected();
+    let stranger = Address::new(77, 5);
+    let mut said = vec![];
+    for second in 0..30 {
+        for request in 0..10 {
+            bench.hear_packet(stranger, &command(OWN, ENGAGE, 1.0, request));
+            bench.hear_packet(stranger, &param_set(OWN, "GLN_NONE", 80.0));
+            bench.run(100);
+        }
+        bench.hear_packet(STATION, &command(OWN, 31010, 0.01 * second as f32, 0));
+        said.extend(texts(&bench.sent()));
+        bench.events();
+    }
+    let of = |part: &str| said.iter().filter(|text| text.contains(part)).count();
+    assert_eq!(of("by 255/190"), 29, "{said:?}");
+    assert!((6..=9).contains(&(of("refused: not an operator") + of("no parameter"))), "{said:?}");
+    assert!(of("more)") >= 2, "{said:?}");
+}
+
 #[test]
 fn only_operators_command_and_each_is_named() {
     let mut bench = Bench::connected();
