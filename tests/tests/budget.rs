@@ -4,7 +4,10 @@
 //! `cargo test --release --workspace --test budget -- --nocapture`
 
 use gleaner_harness::{Ending, FlightRun, FlightScript, MissionPlan, MissionSetup, fly_wired};
+use gleaner_policy::native::WeightFormat;
+use gleaner_policy::onnx::convert;
 use gleaner_tests::board::{Board, Image, Options, StackUse, named_values};
+use gleaner_tests::programs::repository;
 use gleaner_world::{ScenarioKind, World};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -77,12 +80,15 @@ fn measure(image: &Image) -> BTreeMap<&'static str, u64> {
     let mission = sum(&|section| section.name == Image::MISSION);
     let flash = sum(&|section| section.in_flash);
     let static_ram = sum(&|section| section.in_ram);
+    let onnx = std::fs::read(repository().join("models/gleaner.onnx")).unwrap();
+    let weights_i16 = convert(&onnx, WeightFormat::I16).unwrap().len() as u64;
     let (stack, instructions) = fly(image);
     let inference_us = instructions as f64 * CYCLES_PER_INSTRUCTION / CLOCK_MHZ;
     BTreeMap::from([
         ("program", flash - weights - mission),
         ("weights", weights),
         ("image", flash),
+        ("image_i16", flash - weights + weights_i16),
         ("static_ram", static_ram),
         ("stack", stack.used.into()),
         ("ram", static_ram + u64::from(stack.used)),

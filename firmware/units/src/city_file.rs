@@ -272,7 +272,7 @@ mod tests {
         assert_eq!(fault("0,-9999\n"), (1, 2, CityFault::NoData("-9999".into())));
         assert_eq!(fault("0,nan\n"), (1, 2, CityFault::NoData("nan".into())));
         assert_eq!(fault("0,x\n"), (1, 2, CityFault::NotANumber("x".into())));
-        let told = |text: &str| read_city(text.as_bytes(), Metres(20.0)).unwrap_err().to_string();
+        let told = |text: &str| std::format!("{}", read(text).unwrap_err());
         assert_eq!(told("0,\"a\nb\"\n"), "line 1, column 2: \"a\\nb\" is no height in metres");
         let long = told(&std::format!("0,-{}\n", "7".repeat(5_000)));
         assert!(long.len() < 100 && long.contains("777..."), "{long}");

@@ -103,7 +103,8 @@ fn tile<const FUSED: bool>(a: &[f32], inner: usize, panel: &[f32], start: Lanes)
             sums[row] = Lanes::splat(*a[row]).mul_add::<FUSED>(Lanes(*b), sums[row]);
         }
     }
-    sums
+    // Otherwise LLVM may keep a row in four half registers, run out of registers, and wait for the stack in the loop.
+    std::hint::black_box(sums)
 }
 
 /// One row times one panel.
