@@ -41,13 +41,14 @@ const MAH_PERCENT: f32 = 0.5;
 /// Margin on a learned price that is not nominal: gusts and braking make the last cells and the descent that much dearer than the
 /// mean of those before.
 const MARGIN: f32 = 1.05;
-/// What the margin grows by per price above nominal. In a strong wind the courses differ most, and the way home is one that was
-/// seldom flown.
-const MARGIN_SLOPE: f32 = 0.15;
+/// From this price on, in a strong wind, the margin grows by this slope: the courses differ most there, and the way home is one
+/// that was seldom flown. Below it, prices of nominal flights with many turns would send them home early.
+const STRONG: f32 = 1.3;
+const MARGIN_SLOPE: f32 = 0.3;
 
 /// A learned price with its margin.
 fn with_margin(price: f32) -> f32 {
-    price * (MARGIN + MARGIN_SLOPE * (price - 1.0).max(0.0))
+    price * (MARGIN + MARGIN_SLOPE * (price - STRONG).max(0.0))
 }
 
 /// What a new percentage means. A jump teaches nothing.

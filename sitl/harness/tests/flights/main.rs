@@ -1,16 +1,14 @@
 //! Whole missions through real MAVLink bytes, flown by simple policies.
 
+mod handing_back;
+
 use gleaner_harness::{
-    AircraftFault, AutopilotKind, Companion, ComputerFault, Ending, FlightResult, FlightRun, FlightScript,
-    Incident, IncidentKind, LineFault, MissionPlan, MissionSetup, RadioFault, Simulation, Switch,
-    VehicleMode, fly, trajectory,
+    AircraftFault, AutopilotKind, ComputerFault, Ending, FlightResult, FlightScript, Incident, IncidentKind,
+    LineFault, MissionPlan, MissionSetup, RadioFault, Switch, VehicleMode, fly, trajectory,
 };
-use gleaner_pilot::{
-    Budget, Deliberator, LoggedDecision, LookAheadReplay, LookingAhead, OnStop, Onboard, Parameters,
-    Replayed, Settings, State,
-};
+use gleaner_pilot::{Budget, Deliberator, LoggedDecision, LookAheadReplay, LookingAhead, Replayed, State};
 use gleaner_policy::{Attention, Inference, Policy, Tokens};
-use gleaner_units::{Action, BatteryUnits, Duration, Instant};
+use gleaner_units::{Action, BatteryUnits, Duration};
 use gleaner_world::{Episode, ScenarioKind, World};
 use std::sync::Arc;
 
@@ -359,60 +357,6 @@ fn a_flight_with_lookahead_lands_and_its_log_replays() {
         count += 1;
     }
     assert!(count > 20, "{count}");
-}
-
-/// A program that is asked to end 20 s after it was engaged, as by SIGTERM.
-struct Stopped {
-    onboard: Onboard<Waiter>,
-    stops_at: Option<Instant>,
-    is_over: bool,
-}
-
-impl Companion for Stopped {
-    fn exchange(&mut self, simulation: &mut Simulation, now: Instant) {
-        if self.is_over {
-            return;
-        }
-        if self.stops_at.is_some_and(|at| now >= at) {
-            self.onboard.hand_back();
-            self.stops_at = None;
-        }
-        self.onboard.exchange(simulation, now);
-        match self.onboard.state() {
-            State::Engaged if self.stops_at.is_none() && !self.onboard.is_handing_back() => {
-                self.stops_at = Some(now + Duration::from_secs(20));
-            }
-            State::Fault => self.is_over = !self.onboard.is_handing_back(),
-            _ => {}
-        }
-    }
-}
-
-#[test]
-fn a_program_that_ends_requests_to_return_or_to_hold_on_both_autopilots() {
-    for (autopilot, on_stop, mode) in [
-        (AutopilotKind::ArduPilot, OnStop::Return, VehicleMode::Return),
-        (AutopilotKind::ArduPilot, OnStop::Hold, VehicleMode::Brake),
-        (AutopilotKind::Px4, OnStop::Return, VehicleMode::Return),
-        (AutopilotKind::Px4, OnStop::Hold, VehicleMode::Hold),
-    ] {
-        let setup = MissionSetup::new(world(), MissionPlan { autopilot, ..rd(4) }).unwrap();
-        let mut settings = Settings::default();
-        settings.rules.on_stop = on_stop;
-        let onboard = Onboard::new(setup.mission.clone(), Parameters::default(), settings, Waiter, Ok(()));
-        let mut program = Stopped { onboard: onboard.unwrap(), stops_at: None, is_over: false };
-        let mut flight = FlightRun::new(setup, FlightScript::plain(1.0), settings.component_id).unwrap();
-        while !program.is_over {
-            assert_eq!(flight.step(&mut program), None, "{autopilot}: it ends before the program");
-        }
-        // Without Gleaner's setpoints nothing else may happen either.
-        let until = flight.simulation().now() + Duration::from_secs(5);
-        while flight.simulation().now() < until {
-            flight.step(&mut program);
-        }
-        assert_eq!(flight.simulation().truth().mode, mode, "{autopilot}");
-        assert_eq!(flight.simulation().referee().violations(), [], "{autopilot}");
-    }
 }
 
 /// The program does not run for 3.5 s, as after SIGSTOP, and the human pilot selects HOLD (LOITER) late in that time: its
