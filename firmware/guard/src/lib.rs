@@ -24,7 +24,7 @@
 //! The theorem is about cells and a battery level in units. It assumes:
 //! - **Unit price.** A move takes at most one unit and a hover at most half of one. The pilot learns the real prices from the
 //!   measured charge and offers the guard the charge divided by the higher one. The margin on it is 5 %, and grows from
-//!   1.3 times the nominal price on, to 26 % at twice. Until the battery has shown a few percent of use, the nominal price holds,
+//!   1.1 times the nominal price on, to 23 % at twice. Until the battery has shown a few percent of use, the nominal price holds,
 //!   and in slots of more than 4 s (`GLN_SPEED` below 5 m/s in cells of 20 m) the price of hovering for so long.
 //! - **Wind.** The pilot learns from the courses flown what a headwind adds on the way home, and takes it off the charge before it
 //!   is offered. A wind that begins later, or that was met on one course only, is not covered until it is learned;

@@ -41,10 +41,11 @@ const MAH_PERCENT: f32 = 0.5;
 /// Margin on a learned price that is not nominal: gusts and braking make the last cells and the descent that much dearer than the
 /// mean of those before.
 const MARGIN: f32 = 1.05;
-/// From this price on, in a strong wind, the margin grows by this slope: the courses differ most there, and the way home is one
-/// that was seldom flown. Below it, prices of nominal flights with many turns would send them home early.
-const STRONG: f32 = 1.3;
-const MARGIN_SLOPE: f32 = 0.3;
+/// From this price on the margin grows by this slope: in a strong wind the courses differ most, and the way home is one that was
+/// seldom flown. A steeper slope, or one from the nominal price on, sends flights without wind home early when turns make their
+/// cells dear for a while.
+const STRONG: f32 = 1.1;
+const MARGIN_SLOPE: f32 = 0.2;
 
 /// A learned price with its margin.
 fn with_margin(price: f32) -> f32 {
