@@ -37,7 +37,9 @@ fn verify_sent(component: &mut Component, signing: &mut Signing) {
         let Some(sent) = buffer.get(..length).filter(|sent| !sent.is_empty()) else { return };
         let signed = signing.sign(sent).expect("a frame of ours can be signed");
         let mut receiver = Signing::new(SigningKey::new([7; 32]), 2, SigningTime::default(), None);
-        let frame = FrameDecoder::new().read(&mut &*signed).expect("what leaves is a frame");
+        let mut rest = &*signed;
+        let frame = FrameDecoder::new().read(&mut rest).expect("what leaves is a frame");
+        assert!(rest.is_empty());
         assert_eq!(receiver.check(&frame), Ok(()));
     }
 }

@@ -141,7 +141,10 @@ mod tests {
     const PILOT: Address = Address::new(1, 191);
 
     fn decoded(bytes: &[u8]) -> Frame {
-        FrameDecoder::new().read(&mut &*bytes).unwrap()
+        let mut rest = bytes;
+        let frame = FrameDecoder::new().read(&mut rest).unwrap();
+        assert!(rest.is_empty());
+        frame
     }
 
     fn command(frame: &[u8]) -> Option<gleaner_link::Command> {

@@ -124,7 +124,10 @@ mod tests {
     use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
 
     fn decode(bytes: &[u8]) -> Frame {
-        FrameDecoder::new().read(&mut &*bytes).expect("a whole frame")
+        let mut rest = bytes;
+        let frame = FrameDecoder::new().read(&mut rest).expect("a whole frame");
+        assert!(rest.is_empty());
+        frame
     }
 
     #[test]

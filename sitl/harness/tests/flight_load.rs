@@ -164,21 +164,27 @@ fn with_pilot<T>(mission: gleaner_pilot::Mission, flood: usize, work: impl FnOnc
     })
 }
 
+/// Flies one mission to its end.
+fn fly_once(setup: MissionSetup, watched: &mut Watched<'_>) -> FlightResult {
+    let component = Settings::default().component_id;
+    let mut flight = FlightRun::new(setup, FlightScript::plain(0.7), component).unwrap();
+    let ending = loop {
+        if let Some(ending) = flight.step(watched) {
+            break ending;
+        }
+    };
+    flight.end(ending, Some(watched.onboard.state()))
+}
+
 /// Flies a mission to its end: the result, the times of the decisions since the first, and the hostile frames.
 fn fly(flood: usize) -> (FlightResult, Vec<Duration>, usize) {
     let plan = MissionPlan::new(ScenarioKind::ReachDestination, 5);
     let setup = MissionSetup::new(Arc::new(World::default_world()), plan).unwrap();
     with_pilot(setup.mission.clone(), flood, |mut watched| {
-        let component = Settings::default().component_id;
-        let mut flight = FlightRun::new(setup, FlightScript::plain(0.7), component).unwrap();
-        let ending = loop {
-            if let Some(ending) = flight.step(&mut watched) {
-                break ending;
-            }
-        };
+        let result = fly_once(setup, &mut watched);
         let first = watched.decided_at[0];
         let times = watched.decided_at.iter().map(|at| *at - first).collect();
-        (flight.end(ending, Some(watched.onboard.state())), times, watched.sent)
+        (result, times, watched.sent)
     })
 }
 
@@ -226,15 +232,8 @@ fn a_day_of_flights_takes_no_memory() {
     let mut flights = 0;
     with_pilot(setup().mission, 1, |mut watched| {
         while watched.begun < DAY {
-            let component = Settings::default().component_id;
-            let mut flight = FlightRun::new(setup(), FlightScript::plain(0.7), component).unwrap();
-            let ending = loop {
-                if let Some(ending) = flight.step(&mut watched) {
-                    break ending;
-                }
-            };
-            let took = flight.simulation().now() - Instant::ZERO;
-            let result = flight.end(ending, Some(watched.onboard.state()));
+            let result = fly_once(setup(), &mut watched);
+            let took = result.simulation.now() - Instant::ZERO;
             assert!(result.figures().is_good(), "flight {flights}: {:?}", result.figures());
             flights += 1;
             // The battery is changed, and the stranger is gone.
@@ -244,5 +243,34 @@ fn a_day_of_flights_takes_no_memory() {
         assert!(watched.sent > 1_000_000, "{} messages of the stranger", watched.sent);
     });
     println!("{flights} flights in a day");
+    assert_eq!(ALLOCATIONS.get() - before, 0, "allocations by the pilot in a day");
+}
+
+#[test]
+fn a_day_of_polls_takes_no_memory() {
+    /// The pilot's slowest permitted poll.
+    const POLL: Duration = Duration::from_millis(50);
+    let plan = MissionPlan::new(ScenarioKind::ReachDestination, 5);
+    let setup = MissionSetup::new(Arc::new(World::default_world()), plan).unwrap();
+    let vehicle = Address::new(1, 1);
+    // ArduCopter in GUIDED, armed.
+    let heartbeat = Packet::from_payload(0, 50, &[4, 0, 0, 0, 2, 3, 0xD1, 4, 3]).unwrap().frame(vehicle, 0);
+    let before = ALLOCATIONS.get();
+    with_pilot(setup.mission.clone(), 0, |mut watched| {
+        let (mut now, mut bytes) = (Instant::ZERO, 0);
+        let end = Instant::ZERO + Duration::from_secs(24 * 3_600);
+        let mut poll = 0_u32;
+        while now < end {
+            now = now + POLL;
+            if poll.is_multiple_of(20) {
+                counted(|| watched.onboard.receive_link(now, &heartbeat));
+                let stranger = &watched.hostile[(poll / 20) as usize % watched.hostile.len()];
+                counted(|| watched.onboard.receive_link(now, stranger));
+            }
+            poll += 1;
+            watched.turn(now, |sent| bytes += sent.len());
+        }
+        assert!(bytes > 1_000_000, "{bytes} bytes sent in a day");
+    });
     assert_eq!(ALLOCATIONS.get() - before, 0, "allocations by the pilot in a day");
 }

@@ -4,9 +4,8 @@ use super::LogError;
 use super::rotation::{Limits, RotatingFile};
 use super::writer::{LogWriter, NewsSender};
 use gleaner_pilot::{Decision, LoggedDecision, LoggedLookAhead};
-use gleaner_units::Ned;
+use gleaner_units::{Duration, Ned};
 use std::path::Path;
-use std::time::Duration;
 
 /// The open log.
 pub struct DecisionLog {
@@ -28,14 +27,17 @@ impl DecisionLog {
     ) -> Result<DecisionLog, LogError> {
         let file = RotatingFile::open(folder, "decisions", "jsonl", limits, false)
             .map_err(|source| LogError { path: folder.join("decisions.jsonl"), source })?;
-        Ok(DecisionLog { run_s, writer: LogWriter::start("decision log", file, b"\n", Duration::ZERO, news) })
+        Ok(DecisionLog {
+            run_s,
+            writer: LogWriter::start("decision log", file, b"\n", std::time::Duration::ZERO, news),
+        })
     }
 
     /// Hands one decision to the writer. Never waits.
     pub fn write(
         &mut self,
         decision: &Decision,
-        inference_time: Option<gleaner_units::Duration>,
+        inference_time: Option<Duration>,
         position: Option<Ned>,
         lookahead: Option<LoggedLookAhead>,
     ) {

@@ -41,10 +41,9 @@ impl Ports {
         Ports { own, ports: [port(), port(), port()], routes: Vec::new() }
     }
 
-    /// Takes bytes until one frame is complete: the rest of the bytes, and the frame.
-    pub fn receive<'b>(&mut self, link: LinkId, mut bytes: &'b [u8]) -> (&'b [u8], Option<Frame>) {
-        let frame = self.ports[link.0].decoder.read(&mut bytes);
-        (bytes, frame)
+    /// The next frame in what is left of `bytes`.
+    pub fn receive(&mut self, link: LinkId, bytes: &mut &[u8]) -> Option<Frame> {
+        self.ports[link.0].decoder.read(bytes)
     }
 
     /// Passes a frame on. Whether it is (also) addressed to the autopilot.

@@ -69,10 +69,7 @@ impl<S: FlightStack> Autopilot for S {
     }
 
     fn receive(&mut self, link: LinkId, mut bytes: &[u8]) {
-        loop {
-            let (rest, frame) = self.vehicle_mut().ports.receive(link, bytes);
-            let Some(frame) = frame else { return };
-            bytes = rest;
+        while let Some(frame) = self.vehicle_mut().ports.receive(link, &mut bytes) {
             if !self.killed_by_nan() {
                 requests::handle(self, link, &frame);
             }

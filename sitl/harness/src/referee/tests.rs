@@ -70,7 +70,10 @@ impl Stand {
 
     fn send<D: MessageData>(&mut self, now: Instant, data: &D) {
         let bytes = self.pilot.frame(data);
-        self.referee.sent(now, &FrameDecoder::new().read(&mut &*bytes).unwrap());
+        let mut rest = &bytes[..];
+        let frame = FrameDecoder::new().read(&mut rest).unwrap();
+        assert!(rest.is_empty());
+        self.referee.sent(now, &frame);
     }
 
     fn target(&mut self, now: Instant) {
