@@ -5,12 +5,13 @@ use gleaner_host_trainer::env::flight::Flight;
 use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::judge::evaluation::{Network, evaluate_greedy, realizations};
 use gleaner_host_trainer::keep::snapshot::Snapshot;
-use gleaner_host_trainer::learn::distil::Distillation;
+use gleaner_host_trainer::learn::distil::{Distillation, Teaching};
 use gleaner_host_trainer::learn::trainer::{TrainError, Trainer};
 use gleaner_host_trainer::net::Shape;
 use gleaner_host_trainer::observe::tokens;
 use gleaner_host_trainer::planner::teacher::Teacher;
 use gleaner_host_trainer::settings::Settings;
+use gleaner_lookahead::Budget;
 use gleaner_policy::Preference;
 use gleaner_units::Action;
 use gleaner_world::{ScenarioKind, World};
@@ -56,9 +57,9 @@ fn open(
     settings: &Settings,
     folder: &Path,
     from: Option<&Snapshot>,
-    mentors: Vec<Snapshot>,
+    teaching: Teaching,
 ) -> Result<Distillation, TrainError> {
-    Distillation::open(settings.clone(), Site::default_site(), folder, from, mentors)
+    Distillation::open(settings.clone(), Site::default_site(), folder, from, teaching)
 }
 
 #[test]
@@ -66,22 +67,24 @@ fn distillation_learns_and_resumes() {
     let words =
         ["distil", "--updates", "300", "--batch", "8", "--replay", "3000", "--learning-rate", "0.001"];
     let settings = Command::parse_from(words).settings;
-    let folder = tempfile::tempdir().unwrap();
-    let mut run = open(&settings, folder.path(), None, Vec::new()).unwrap();
-    let first = run.advance().unwrap().cross_entropy;
-    assert!(first < (Action::COUNT as f32).ln() * 1.2, "an untrained policy is near uniform: {first}");
-    while run.update() < 200 {
-        run.advance().unwrap();
+    for teaching in [Teaching::Planner, Teaching::LookAhead(Budget { tours: 20 })] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut run = open(&settings, folder.path(), None, teaching.clone()).unwrap();
+        let first = run.advance().unwrap().cross_entropy;
+        assert!(first < (Action::COUNT as f32).ln() * 1.2, "an untrained policy is near uniform: {first}");
+        while run.update() < 200 {
+            run.advance().unwrap();
+        }
+        run.save(folder.path()).unwrap();
+        drop(run);
+        let mut run = open(&settings, folder.path(), None, teaching.clone()).unwrap();
+        assert_eq!(run.update(), 200);
+        let mut last = 0.0;
+        while !run.is_done() {
+            last += run.advance().unwrap().cross_entropy / 100.0;
+        }
+        assert!(last < 0.75 * first, "{teaching:?}: cross entropy {first} before, {last} after 300 updates");
     }
-    run.save(folder.path()).unwrap();
-    drop(run);
-    let mut run = open(&settings, folder.path(), None, Vec::new()).unwrap();
-    assert_eq!(run.update(), 200);
-    let mut last = 0.0;
-    while !run.is_done() {
-        last += run.advance().unwrap().cross_entropy / 100.0;
-    }
-    assert!(last < 0.75 * first, "cross entropy {first} before, {last} after 300 updates");
 }
 
 /// The student starts as its own mentor. The views of an untrained network disagree, those of the student less.
@@ -114,8 +117,8 @@ fn views_of_a_self_distilled_policy_agree() {
     };
     let folder = tempfile::tempdir().unwrap();
     let mut best = None;
-    let mentors = vec![mentor.clone()];
-    let mut run = open(&settings, folder.path(), Some(&mentor), mentors).unwrap();
+    let teaching = Teaching::Mentors(vec![mentor.clone()]);
+    let mut run = open(&settings, folder.path(), Some(&mentor), teaching).unwrap();
     while !run.is_done() {
         assert!(run.advance().unwrap().cross_entropy.is_finite());
     }

@@ -6,6 +6,8 @@ use std::process::Command;
 
 /// Seeds of the comparison with GREEDY.
 const SEEDS: u64 = 20;
+/// What look-ahead collects beyond GREEDY at least, percentage points.
+const LEAD: f64 = 20.0;
 
 fn fly(arguments: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
@@ -49,17 +51,6 @@ fn the_json_report_has_the_documented_keys() {
     assert_eq!(report["engine"], "native");
 }
 
-/// At nominal consumption the learned battery prices stay nominal, so that no flight goes home early.
-#[test]
-fn nominal_flights_spend_their_budget_on_data() {
-    for autopilot in ["ardupilot", "px4"] {
-        for seed in ["3", "5"] {
-            let report = fly(&["--preference", "0.9", "--seed", seed, "--autopilot-kind", autopilot]);
-            assert!(report["collected"].as_f64().unwrap() > 0.95, "{autopilot}: {report}");
-        }
-    }
-}
-
 #[test]
 fn at_w_0_the_shortest_way_is_flown() {
     for seed in ["1", "2", "3"] {
@@ -70,21 +61,27 @@ fn at_w_0_the_shortest_way_is_flown() {
     }
 }
 
-/// The mean of 20 seeds, flown through MAVLink, against GREEDY on the same realizations on the grid.
+/// The mean of 20 seeds, flown through MAVLink with each autopilot, against GREEDY on the same realizations on the grid. The
+/// lead is that of flights on the grid, so a flight that goes home early at nominal consumption fails this.
 #[test]
-fn at_w_1_the_policy_collects_more_than_greedy() {
+fn at_w_1_the_policy_collects_much_more_than_greedy() {
     for scenario in ["rd", "rb"] {
-        let mut sum = 0.0;
-        for seed in 0..SEEDS {
-            let report = fly(&["--scenario", scenario, "--preference", "1", "--seed", &seed.to_string()]);
-            assert_eq!((&report["landed"], &report["violations"]), (&true.into(), &0.into()), "{report}");
-            assert!(report["energy"].as_f64().unwrap() <= 80.0, "{report}");
-            sum += report["collected"].as_f64().unwrap();
-        }
-        let policy = 100.0 * sum / SEEDS as f64;
         let greedy = greedy_percent(scenario);
-        println!("{scenario}: policy {policy:.1} %, GREEDY {greedy:.1} %, mean of {SEEDS} seeds");
-        assert!(policy > greedy, "{scenario}: policy {policy:.1} %, GREEDY {greedy:.1} %");
+        for autopilot in ["ardupilot", "px4"] {
+            let mut sum = 0.0;
+            for seed in 0..SEEDS {
+                let seed = seed.to_string();
+                let kind = ["--scenario", scenario, "--autopilot-kind", autopilot];
+                let report = fly(&[&kind[..], &["--preference", "1", "--seed", &seed]].concat());
+                assert_eq!((&report["landed"], &report["violations"]), (&true.into(), &0.into()), "{report}");
+                assert!(report["energy"].as_f64().unwrap() <= 80.0, "{report}");
+                sum += report["collected"].as_f64().unwrap();
+            }
+            let policy = 100.0 * sum / SEEDS as f64;
+            let line = format!("{scenario}, {autopilot}: policy {policy:.1} %, GREEDY {greedy:.1} %");
+            println!("{line}, mean of {SEEDS} seeds");
+            assert!(policy > greedy + LEAD, "{line}");
+        }
     }
 }
 

@@ -238,6 +238,23 @@ impl<const D: usize> LookAhead<D> {
         })
     }
 
+    /// The utility of each allowed action followed by the kept plan, `w . (percent, -battery units)` of the rest of the mission;
+    /// minus infinity for the others. `None` without a plan. To be called after [`LookAhead::propose`] in the same slot.
+    #[must_use]
+    pub fn utilities(&self, view: &View<'_>, mask: ActionMask) -> Option<[f32; Action::COUNT]> {
+        let tour = self.tour.as_ref()?;
+        let state = self.state(view);
+        let (links, rates, initial_units, _) = self.parts();
+        let model = Onboard { links, rates, guard: view.guard, initial_units };
+        let w_data = view.preference.w_data().min(W_DATA_MAX);
+        let problem = Problem { model: &model, state: &state, w_data };
+        let mut utilities = [f32::NEG_INFINITY; Action::COUNT];
+        for action in mask.iter() {
+            utilities[action.index()] = problem.utility(&problem.after(action, tour));
+        }
+        Some(utilities)
+    }
+
     /// Takes the slot that is about to be flown off the kept plan: a hover at its first stop shortens the dwell.
     fn spend(&mut self, cell: Cell, action: Action) {
         let first = self.tour.as_mut().and_then(|tour| tour.stops.first_mut());
@@ -342,6 +359,16 @@ impl<const D: usize> Problem<'_, Onboard<'_, D>, D> {
         end.finish(self.model, &tour);
         end.first.map(|action| Plan { tour, action, value, end, source })
     }
+
+    /// The end of the mission when this action is flown first, then the tour.
+    fn after(&self, action: Action, tour: &Tour) -> State<D> {
+        let mut end = *self.state;
+        end.slot(self.model, action);
+        if !end.over {
+            end.finish(self.model, tour);
+        }
+        end
+    }
 }
 
 impl<const D: usize> Plan<D> {
@@ -354,11 +381,7 @@ impl<const D: usize> Plan<D> {
     ) {
         let planned = self.action;
         for aside in mask.iter().filter(|&aside| aside != planned) {
-            let mut end = *problem.state;
-            end.slot(problem.model, aside);
-            if !end.over {
-                end.finish(problem.model, &self.tour);
-            }
+            let end = problem.after(aside, &self.tour);
             let value = problem.utility(&end);
             let is_network = network == Some(aside);
             if value > self.value + TIE || (is_network && value >= self.value - TIE) {

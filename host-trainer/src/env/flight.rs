@@ -1,6 +1,7 @@
 //! A mission on the grid under the safety envelope: an episode of the learner.
 
 use gleaner_guard::Guard;
+use gleaner_lookahead::View;
 use gleaner_policy::{DeviceState, Preference, Situation, TokenTable, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
 use gleaner_world::{City, Episode, Realization, ScenarioError, Seed, Stream, World};
@@ -149,6 +150,18 @@ impl Flight {
             let (arrived, remaining) = self.report(index);
             DeviceState { cell: device.cell, remaining, snr: arrived.then_some(device.snr) }
         })
+    }
+
+    /// What the look-ahead is told in the current slot. `devices`: from [`Flight::device_states`].
+    #[must_use]
+    pub fn view<'a>(&'a self, devices: &'a [DeviceState]) -> View<'a> {
+        View {
+            cell: self.episode.uav(),
+            battery: self.episode.battery(),
+            preference: self.preference,
+            guard: &self.guard,
+            devices,
+        }
     }
 
     /// The policy's observation of the current slot.

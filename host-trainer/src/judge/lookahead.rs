@@ -2,7 +2,7 @@
 
 use crate::env::flight::Flight;
 use crate::judge::evaluation::{Decider, DeciderError};
-use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, Source, View};
+use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, Source};
 use gleaner_policy::{DeviceState, K_MAX, Policy};
 use gleaner_units::{Action, Sight};
 use std::time::{Duration, Instant};
@@ -77,16 +77,9 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
             let map = self.has_map.then(|| flight.map() as &dyn Sight);
             lookahead.begin(map, &devices, 0);
         }
-        let view = View {
-            cell: flight.episode().uav(),
-            battery: flight.episode().battery(),
-            preference: flight.preference(),
-            guard: flight.guard(),
-            devices: &devices,
-        };
         let begun = Instant::now();
         let choice = lookahead
-            .propose(&view, &answer.logits, flight.mask(), self.budget)
+            .propose(&flight.view(&devices), &answer.logits, flight.mask(), self.budget)
             .ok_or_else(|| DeciderError("no action is allowed".into()))?;
         self.times[1].push(begun.elapsed());
         let source = match choice.source {

@@ -1,7 +1,7 @@
 //! Distillation: the actor imitates a teacher from its own observations.
 //!
-//! The teacher is a planner with full knowledge, or an ensemble of trained policies (mentors), each evaluated in the
-//! eight views of the state. The errors of a network differ from view to view, so the mean of its logits is better than
+//! The teacher ([`Teaching`]) is a planner with full knowledge, the look-ahead that flies, which knows what the student is told,
+//! or an ensemble of trained policies (mentors), each evaluated in the eight views of the state. The errors of a network differ from view to view, so the mean of its logits is better than
 //! each of them, and a student of the mean keeps the gain (ensemble distillation: Hinton, Vinyals and Dean 2015).
 //!
 //! The student flies and the teacher labels every state (DAgger: Ross, Gordon and Bagnell 2011), so that the student is
@@ -22,7 +22,8 @@ use crate::observe::Encoding;
 use crate::observe::tokens::{Observation, PolicyTokens};
 use crate::planner::teacher::{Course, Teacher};
 use crate::settings::Settings;
-use gleaner_policy::{Preference, View};
+use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead};
+use gleaner_policy::{DeviceState, K_MAX, Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::ScenarioKind;
 use rand::{RngExt, SeedableRng};
@@ -36,6 +37,10 @@ use std::path::Path;
 pub const CHECKPOINT: &str = "distil.checkpoint";
 /// Name in the checkpoint.
 const NAME: &str = "distil";
+
+/// Temperature of the look-ahead's labels: a loss of this utility divides the probability of an action by e. At 0.1, the planner's
+/// temperature, a detour that the rest of the plan makes good is as probable as the plan, and the student dithers.
+const IMPROVED_TEMPERATURE: f32 = 0.01;
 
 /// Hyper-parameters that the command line does not set. Source of all: trials on the default city.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,16 +97,35 @@ impl fmt::Display for CrossEntropy {
     }
 }
 
+/// What the student imitates.
+#[derive(Clone, Debug)]
+pub enum Teaching {
+    /// The planner with full knowledge, [`Teacher`].
+    Planner,
+    /// The look-ahead that flies, from the student's own action and with this budget: expert iteration (Anthony, Tian and Barber
+    /// 2017). Its knowledge is the student's, so that nothing in the labels is beyond the observation but the memory of earlier
+    /// slots.
+    LookAhead(Budget),
+    /// The mean of these policies over the eight views of the state.
+    Mentors(Vec<Snapshot>),
+}
+
+/// The teacher in one flight.
+enum Lessons {
+    Planner(Course),
+    LookAhead(Box<LookAhead<K_MAX>>, Budget),
+    Mentors,
+}
+
 /// A run of distillation.
 pub struct Distillation {
     method: String,
     settings: Settings,
     constants: DistilSettings,
     site: Site,
-    teacher: Teacher,
-    /// The teachers in place of the planner, if any.
-    mentors: Vec<Snapshot>,
-    flights: Vec<(Flight, Course)>,
+    planner: Teacher,
+    teaching: Teaching,
+    flights: Vec<(Flight, Lessons)>,
     shortest: VecDeque<Example>,
     stored: Stored,
     gradients: Vec<f32>,
@@ -127,17 +151,39 @@ struct Stored {
 }
 
 fn not_a_number() -> DeciderError {
-    DeciderError("a mentor's output is not a number".into())
+    DeciderError("a network's output is not a number".into())
+}
+
+/// The action of the look-ahead, and a label: the softmax of the utilities of the allowed actions, each followed by the plan.
+fn improve(
+    lookahead: &mut LookAhead<K_MAX>,
+    flight: &Flight,
+    logits: &[f32; ACTIONS],
+    budget: Budget,
+) -> Result<(Action, [f32; ACTIONS]), DeciderError> {
+    let (mask, devices) = (flight.mask(), flight.device_states().collect::<Vec<_>>());
+    let view = flight.view(&devices);
+    let choice = lookahead.propose(&view, logits, mask, budget).ok_or_else(not_a_number)?;
+    // Without a plan the student's own action stays.
+    let utilities = lookahead.utilities(&view, mask).unwrap_or(*logits);
+    let mut labels = utilities.map(|utility| utility / IMPROVED_TEMPERATURE);
+    labels[choice.action.index()] = labels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    Ok((choice.action, Distribution::new(&labels, mask).probability))
 }
 
 /// The chain of commands that ends with this run, without its settings.
-fn method(from: Option<&Snapshot>, mentors: &[Snapshot]) -> String {
+fn method(from: Option<&Snapshot>, teaching: &Teaching) -> String {
     let whole = |snapshot: &Snapshot, out: &str| {
         snapshot.command_line(out).trim_start_matches("gleaner-train ").to_owned()
     };
     let mut method = from.map_or("distil".to_owned(), |from| {
         format!("{} && gleaner-train distil --from FIRST", whole(from, "FIRST"))
     });
+    let mentors = match teaching {
+        Teaching::Planner => [].as_slice(),
+        Teaching::LookAhead(Budget { tours }) => return method + &format!(" --lookahead {tours}"),
+        Teaching::Mentors(mentors) => mentors,
+    };
     for (index, mentor) in mentors.iter().enumerate() {
         if from.is_some_and(|from| from.actor == mentor.actor) {
             method += " --mentor FIRST";
@@ -150,8 +196,7 @@ fn method(from: Option<&Snapshot>, mentors: &[Snapshot]) -> String {
 }
 
 impl Distillation {
-    /// Continues from the checkpoint in `folder`, or starts with the actor of `from` if given. Mentors replace the
-    /// planner as the teacher.
+    /// Continues from the checkpoint in `folder`, or starts with the actor of `from` if given.
     ///
     /// # Errors
     /// The checkpoint is damaged or of another run; no mission could be drawn.
@@ -160,7 +205,7 @@ impl Distillation {
         site: Site,
         folder: &Path,
         from: Option<&Snapshot>,
-        mentors: Vec<Snapshot>,
+        teaching: Teaching,
     ) -> Result<Distillation, TrainError> {
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let stored = match resume::load::<Stored>(&folder.join(CHECKPOINT), NAME, &settings)? {
@@ -171,11 +216,11 @@ impl Distillation {
             None => Stored::start(from, &mut rng),
         };
         let mut run = Distillation {
-            teacher: Teacher::new(site.world().clone()),
+            planner: Teacher::new(site.world().clone()),
             validation: Validation::draw(&site, &settings)?,
-            method: method(from, &mentors),
+            method: method(from, &teaching),
             constants: DistilSettings::DEFAULT,
-            mentors,
+            teaching,
             settings,
             site,
             flights: Vec::new(),
@@ -195,7 +240,7 @@ impl Distillation {
 
     /// Flight 0 is always the mission out and back for energy alone. It lasts two slots, so the examples of drawn
     /// missions would hardly contain it, and it must be flown without an error.
-    fn next_flight(&mut self, index: usize) -> Result<(Flight, Course), TrainError> {
+    fn next_flight(&mut self, index: usize) -> Result<(Flight, Lessons), TrainError> {
         let mut mission = self.settings.missions().mission(&self.site, self.stored.next_mission)?;
         self.stored.next_mission += 1;
         if index == 0 && self.settings.share_rb > 0.0 {
@@ -205,7 +250,17 @@ impl Distillation {
         }
         let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?
             .with_table(self.site.table());
-        Ok((flight, self.teacher.study(&mission.realization)))
+        let lessons = match &self.teaching {
+            Teaching::Planner => Lessons::Planner(self.planner.study(&mission.realization)),
+            Teaching::LookAhead(budget) => {
+                let mut lookahead = LookAhead::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
+                let devices: Vec<DeviceState> = flight.device_states().collect();
+                lookahead.begin(Some(flight.map()), &devices, self.rng.random());
+                Lessons::LookAhead(Box::new(lookahead), *budget)
+            }
+            Teaching::Mentors(_) => Lessons::Mentors,
+        };
+        Ok((flight, lessons))
     }
 
     /// One slot of every flight: the teacher labels the state; the student, or at first the teacher, flies.
@@ -220,11 +275,13 @@ impl Distillation {
         let progress = self.stored.update as f64 / self.constants.hand_over as f64;
         let student_share = progress.min(self.constants.student_share);
         for (index, (state, logits)) in states.into_iter().zip(logits).enumerate() {
-            let (flight, course) = &mut self.flights[index];
+            let (flight, lessons) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
-            let (advice, target) = match mentors.get(index) {
-                None => course.teach(flight),
-                Some(logits) => {
+            let (advice, target) = match lessons {
+                Lessons::Planner(course) => course.teach(flight),
+                Lessons::LookAhead(lookahead, budget) => improve(lookahead, flight, &logits, *budget)?,
+                Lessons::Mentors => {
+                    let logits = &mentors[index];
                     let advice = mask.argmax(logits).ok_or_else(not_a_number)?;
                     (advice, Distribution::new(logits, mask).probability)
                 }
@@ -258,7 +315,8 @@ impl Distillation {
 
     /// Mean logits of all mentors in all views; empty without mentors.
     fn mentor_logits(&self, inputs: &[Sample]) -> Vec<[f32; ACTIONS]> {
-        let Some((first, others)) = self.mentors.split_first() else { return Vec::new() };
+        let Teaching::Mentors(mentors) = &self.teaching else { return Vec::new() };
+        let Some((first, others)) = mentors.split_first() else { return Vec::new() };
         let logits = |mentor: &Snapshot| Network::new(Shape::actor(), &mentor.actor).averaged_logits(inputs);
         let mut mean = logits(first);
         for mentor in others {
@@ -266,7 +324,7 @@ impl Distillation {
                 *sum += logit;
             }
         }
-        let share = 1.0 / self.mentors.len() as f32;
+        let share = 1.0 / mentors.len() as f32;
         mean.as_flattened_mut().iter_mut().for_each(|logit| *logit *= share);
         mean
     }

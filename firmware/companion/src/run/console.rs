@@ -5,7 +5,8 @@ use gleaner_link::{Address, Component};
 use gleaner_pilot::{Decision, State};
 use std::io::IsTerminal;
 use tracing_appender::non_blocking::WorkerGuard;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::prelude::*;
 
 const HEARTBEAT: u32 = 0;
 const STATUSTEXT: u32 = 253;
@@ -24,16 +25,17 @@ impl Console {
     /// `verbose`.
     pub fn start(verbose: bool) -> Console {
         let (writer, guard) = tracing_appender::non_blocking(std::io::stderr());
-        let level = if verbose { "debug" } else { "info" };
-        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
-        tracing_subscriber::fmt()
-            .with_env_filter(filter)
+        let level = if verbose { LevelFilter::DEBUG } else { LevelFilter::INFO };
+        let asked = std::env::var("RUST_LOG").ok().filter(|text| !text.is_empty());
+        let filter = asked.and_then(|text| text.parse::<Targets>().ok());
+        let lines = tracing_subscriber::fmt::layer()
             .with_ansi(std::io::stderr().is_terminal())
             .with_writer(writer)
             // A failure to print cannot be printed.
             .log_internal_errors(false)
             .with_target(false)
-            .init();
+            .with_filter(filter.unwrap_or_else(|| Targets::new().with_default(level)));
+        tracing_subscriber::registry().with(lines).init();
         Console { _writer: guard, reported: State::Boot, serving: None }
     }
 

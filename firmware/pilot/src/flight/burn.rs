@@ -12,6 +12,9 @@
 //! the monitor counts mAh, and these agree with the percentage, each half percent of them gives such an equation instead
 //! ([`super::charge`]).
 //!
+//! What braking, a turn and accelerating add to the time of a leg counts as hovering ([`super::leg`]): as part of the price of a
+//! cell, some turns in a row would make the way home look twice as dear as it is.
+//!
 //! The price of the last few steps is watched beside that of the last 25. When it is clearly higher, the older steps
 //! belong to another wind, and both prices count by the same factor more.
 
@@ -42,8 +45,7 @@ const MAH_PERCENT: f32 = 0.5;
 /// mean of those before.
 const MARGIN: f32 = 1.05;
 /// From this price on the margin grows by this slope: in a strong wind the courses differ most, and the way home is one that was
-/// seldom flown. A steeper slope, or one from the nominal price on, sends flights without wind home early when turns make their
-/// cells dear for a while.
+/// seldom flown.
 const STRONG: f32 = 1.1;
 const MARGIN_SLOPE: f32 = 0.2;
 

@@ -229,7 +229,11 @@ impl Flight {
     ) {
         let leg = &mut self.course.leg;
         match leg.purpose {
-            Purpose::Move => energy.burn.flew(leg.cover(position), leg.direction().0),
+            Purpose::Move => {
+                let cells = leg.cover(position);
+                energy.burn.flew(cells, leg.direction().0);
+                energy.burn.hovered(leg.turned_s(cells, passed_s, scene.slot().as_secs_f32()));
+            }
             Purpose::Hover | Purpose::Centre => energy.burn.hovered(passed_s),
         }
         if energy.read(scene) {
@@ -370,7 +374,10 @@ impl Flight {
         energy.pay(action);
         let leg = match action {
             Action::Hover => Leg::new(scene.now, Purpose::Hover, ends.0, ends.1).lasting(scene.slot()),
-            _ => Leg::new(scene.now, Purpose::Move, ends.0, ends.1),
+            _ => {
+                let leg = Leg::new(scene.now, Purpose::Move, ends.0, ends.1);
+                if leg.continues(&self.course.leg) { leg } else { leg.turning() }
+            }
         };
         self.course.follow(leg, self.arrival(scene));
     }
