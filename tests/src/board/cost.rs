@@ -17,6 +17,10 @@ pub struct LookAheadCost {
     pub tokens: Vec<u64>,
     /// Instructions of each mask of the guard.
     pub masks: Vec<u64>,
+    /// Instructions to take in each position of the autopilot, from bytes to the component's state.
+    pub received: Vec<u64>,
+    /// Instructions to send each target, from its coordinates to bytes.
+    pub sent: Vec<u64>,
 }
 
 impl LookAheadCost {
@@ -50,10 +54,13 @@ impl LookAheadCost {
                 "decision" => cost.decisions.push(instructions),
                 "tokens" => cost.tokens.push(instructions),
                 "mask" => cost.masks.push(instructions),
+                "received" => cost.received.push(instructions),
+                "sent" => cost.sent.push(instructions),
+                "length" => ensure!(value > 12, "no target was sent: {said}"),
                 _ => {}
             }
         }
-        ensure!(!cost.decisions.is_empty(), "no decision: {said}");
+        ensure!(!cost.decisions.is_empty() && !cost.sent.is_empty(), "no decision: {said}");
         Ok(cost)
     }
 }

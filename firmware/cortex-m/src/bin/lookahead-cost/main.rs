@@ -13,10 +13,12 @@ use cortex_m_rt::entry;
 use gleaner_cortex_m::Cause;
 use gleaner_cortex_m::bare::end;
 use gleaner_guard::Guard;
+use gleaner_link::{Component, Parameters, PositionTarget, Settings};
 use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, View};
 use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
 use gleaner_units::{
-    Action, ActionMask, BatteryUnits, Cell, CellSet, Db, Grid, HeightMap, Metres, Rays, Sight,
+    Action, ActionMask, BatteryUnits, Cell, CellSet, Db, Duration, Grid, HeightMap, Instant, Metres, Ned,
+    Rays, Sight,
 };
 use heapless::String;
 use static_cell::StaticCell;
@@ -33,9 +35,23 @@ const WRITE0: u32 = 0x04;
 const EXIT: u32 = 0x18;
 const APPLICATION_EXIT: u32 = 0x2_0026;
 
+/// Of an ArduCopter in GUIDED, from `firmware/link/tests/golden/packets.txt`.
+const HEARTBEAT: [u8; 21] = [
+    0xFD, 0x09, 0x00, 0x00, 0x07, 0x2A, 0x01, 0x00, 0x00, 0x00, 0x04, 0x00, 0x00, 0x00, 0x02, 0x03, 0xD9,
+    0x04, 0x03, 0x5B, 0x10,
+];
+/// `LOCAL_POSITION_NED` of the same vehicle.
+const POSITION: [u8; 40] = [
+    0xFD, 0x1C, 0x00, 0x00, 0x07, 0x2A, 0x01, 0x20, 0x00, 0x00, 0x40, 0xE2, 0x01, 0x00, 0x00, 0x00, 0x48,
+    0x41, 0x00, 0x00, 0x09, 0xC2, 0x00, 0x00, 0x70, 0xC2, 0x00, 0x00, 0xC0, 0x3F, 0x00, 0x00, 0x20, 0xC0,
+    0x00, 0x00, 0x80, 0x3E, 0x2A, 0xBC,
+];
+const MESSAGES: usize = 5;
+
 static PLANNER: StaticCell<LookAhead<DEVICES>> = StaticCell::new();
 static HEIGHTS: StaticCell<HeightMap> = StaticCell::new();
 static GUARD: StaticCell<Guard> = StaticCell::new();
+static COMPONENT: StaticCell<Component> = StaticCell::new();
 
 fn print(name: &str, value: u32) {
     let mut line = String::<48>::new();
@@ -115,6 +131,28 @@ fn measure() -> Option<()> {
     Some(())
 }
 
+/// One message read and taken in, and one target made, framed and handed out.
+fn measure_wire() -> Option<()> {
+    let settings = Settings::new(Some(42), 191).ok()?;
+    let component = COMPONENT.try_init(Component::new(settings, Parameters::default()))?;
+    let mut now = Instant::ZERO;
+    component.receive(now, &HEARTBEAT);
+    let target = PositionTarget::at(Ned { north_m: 10.0, east_m: -20.0, down_m: -60.0 });
+    let mut out = [0; 280];
+    for _ in 0..MESSAGES {
+        now = now + Duration::from_millis(100);
+        print("received", ticks(|| component.receive(now, &POSITION)));
+        let mut length = 0;
+        let work = || {
+            let _ = component.steer(now, &target);
+            length = component.transmit(&mut out);
+        };
+        print("sent", ticks(work));
+        print("length", length as u32);
+    }
+    Some(())
+}
+
 /// The library needs it; there is no log here.
 #[unsafe(no_mangle)]
 fn gleaner_wake_log() {}
@@ -131,6 +169,7 @@ fn main() -> ! {
         core.SYST.clear_current();
         core.SYST.enable_counter();
         let _ = measure();
+        let _ = measure_wire();
         // SAFETY: ends the emulator.
         unsafe { cortex_m::asm::semihosting_syscall(EXIT, APPLICATION_EXIT) };
     }
