@@ -11,19 +11,20 @@
 use crate::env::distribution::{ACTIONS, Distribution};
 use crate::env::flight::Flight;
 use crate::env::site::Site;
-use crate::judge::evaluation::{DeciderError, Network};
+use crate::judge::evaluation::Network;
 use crate::judge::validation::{Tables, Validation};
 use crate::keep::checkpoint::CheckpointError;
 use crate::keep::snapshot::{LAST, Snapshot};
 use crate::learn::resume;
+use crate::learn::teaching::Lessons;
 use crate::learn::trainer::{Pace, TrainError, Trainer};
 use crate::net::{self, Adam, Batch, Sample, Shape, Workspace};
 use crate::observe::Encoding;
 use crate::observe::tokens::{Observation, PolicyTokens};
-use crate::planner::teacher::{Course, Teacher};
+use crate::planner::teacher::Teacher;
 use crate::settings::Settings;
-use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead};
-use gleaner_policy::{DeviceState, K_MAX, Preference, View};
+use gleaner_lookahead::Budget;
+use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::ScenarioKind;
 use rand::{RngExt, SeedableRng};
@@ -33,14 +34,12 @@ use std::collections::VecDeque;
 use std::fmt;
 use std::path::Path;
 
+pub use crate::learn::teaching::Teaching;
+
 /// File name of the checkpoint inside the output folder.
 pub const CHECKPOINT: &str = "distil.checkpoint";
 /// Name in the checkpoint.
 const NAME: &str = "distil";
-
-/// Temperature of the look-ahead's labels: a loss of this utility divides the probability of an action by e. At 0.1, the planner's
-/// temperature, a detour that the rest of the plan makes good is as probable as the plan, and the student dithers.
-const IMPROVED_TEMPERATURE: f32 = 0.01;
 
 /// Hyper-parameters that the command line does not set. Source of all: trials on the default city.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,26 +96,6 @@ impl fmt::Display for CrossEntropy {
     }
 }
 
-/// What the student imitates.
-#[derive(Clone, Debug)]
-pub enum Teaching {
-    /// The planner with full knowledge, [`Teacher`].
-    Planner,
-    /// The look-ahead that flies, from the student's own action and with this budget: expert iteration (Anthony, Tian and Barber
-    /// 2017). Its knowledge is the student's, so that nothing in the labels is beyond the observation but the memory of earlier
-    /// slots.
-    LookAhead(Budget),
-    /// The mean of these policies over the eight views of the state.
-    Mentors(Vec<Snapshot>),
-}
-
-/// The teacher in one flight.
-enum Lessons {
-    Planner(Course),
-    LookAhead(Box<LookAhead<K_MAX>>, Budget),
-    Mentors,
-}
-
 /// A run of distillation.
 pub struct Distillation {
     method: String,
@@ -148,27 +127,6 @@ struct Stored {
     update: u64,
     steps: u64,
     rng_word: u128,
-}
-
-fn not_a_number() -> DeciderError {
-    DeciderError("a network's output is not a number".into())
-}
-
-/// The action of the look-ahead, and a label: the softmax of the utilities of the allowed actions, each followed by the plan.
-fn improve(
-    lookahead: &mut LookAhead<K_MAX>,
-    flight: &Flight,
-    logits: &[f32; ACTIONS],
-    budget: Budget,
-) -> Result<(Action, [f32; ACTIONS]), DeciderError> {
-    let (mask, devices) = (flight.mask(), flight.device_states().collect::<Vec<_>>());
-    let view = flight.view(&devices);
-    let choice = lookahead.propose(&view, logits, mask, budget).ok_or_else(not_a_number)?;
-    // Without a plan the student's own action stays.
-    let utilities = lookahead.utilities(&view, mask).unwrap_or(*logits);
-    let mut labels = utilities.map(|utility| utility / IMPROVED_TEMPERATURE);
-    labels[choice.action.index()] = labels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    Ok((choice.action, Distribution::new(&labels, mask).probability))
 }
 
 /// The chain of commands that ends with this run, without its settings.
@@ -250,16 +208,8 @@ impl Distillation {
         }
         let flight = Flight::new(self.site.world(), &mission.realization, mission.seed, mission.preference)?
             .with_table(self.site.table());
-        let lessons = match &self.teaching {
-            Teaching::Planner => Lessons::Planner(self.planner.study(&mission.realization)),
-            Teaching::LookAhead(budget) => {
-                let mut lookahead = LookAhead::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
-                let devices: Vec<DeviceState> = flight.device_states().collect();
-                lookahead.begin(Some(flight.map()), &devices, self.rng.random());
-                Lessons::LookAhead(Box::new(lookahead), *budget)
-            }
-            Teaching::Mentors(_) => Lessons::Mentors,
-        };
+        let lessons =
+            self.teaching.begin(&flight, &mission.realization, &self.planner, self.stored.next_mission);
         Ok((flight, lessons))
     }
 
@@ -277,15 +227,7 @@ impl Distillation {
         for (index, (state, logits)) in states.into_iter().zip(logits).enumerate() {
             let (flight, lessons) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
-            let (advice, target) = match lessons {
-                Lessons::Planner(course) => course.teach(flight),
-                Lessons::LookAhead(lookahead, budget) => improve(lookahead, flight, &logits, *budget)?,
-                Lessons::Mentors => {
-                    let logits = &mentors[index];
-                    let advice = mask.argmax(logits).ok_or_else(not_a_number)?;
-                    (advice, Distribution::new(logits, mask).probability)
-                }
-            };
+            let (advice, target) = lessons.label(flight, &logits, mentors.get(index))?;
             // The student acts as on board, so that the states are those of the finished policy.
             let own = mask.argmax(&logits).unwrap_or(advice);
             let action = if self.rng.random_bool(student_share) { own } else { advice };

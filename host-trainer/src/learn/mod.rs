@@ -14,4 +14,5 @@ pub mod ppo;
 pub mod replay;
 mod resume;
 pub mod run;
+mod teaching;
 pub mod trainer;
