@@ -248,11 +248,13 @@ impl<const D: usize> LookAhead<D> {
         let model = Onboard { links, rates, guard: view.guard, initial_units };
         let w_data = view.preference.w_data().min(W_DATA_MAX);
         let problem = Problem { model: &model, state: &state, w_data };
-        let mut utilities = [f32::NEG_INFINITY; Action::COUNT];
-        for action in mask.iter() {
-            utilities[action.index()] = problem.utility(&problem.after(action, tour));
-        }
-        Some(utilities)
+        Some(Action::ALL.map(|action| {
+            if mask.allows(action) {
+                problem.utility(&problem.after(action, tour))
+            } else {
+                f32::NEG_INFINITY
+            }
+        }))
     }
 
     /// Takes the slot that is about to be flown off the kept plan: a hover at its first stop shortens the dwell.
