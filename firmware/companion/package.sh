@@ -34,12 +34,20 @@ has_target() {
     folder=$(rustc --print target-libdir --target "$1") && compgen -G "$folder/libcore-*.rlib" >/dev/null
 }
 
+profile=dist
+[[ -z ${NO_BUILD:-} ]] || profile=release
+
 build() {
     [[ -n ${NO_BUILD:-} ]] || cargo build --profile dist --package gleaner-companion --bin gleaner "$@"
 }
 
-profile=dist
-[[ -z ${NO_BUILD:-} ]] || profile=release
+# Removes symbols and line tables, which a program of `cargo build --release` has.
+strip_for() {
+    local tool=strip
+    [[ $1 == "$(dpkg --print-architecture)" ]] || tool=$(machine "$1")-linux-gnu-strip
+    command -v "$tool" >/dev/null || fail "$tool is missing: apt install binutils"
+    "$tool" "$2"
+}
 
 # Releases of cargo-deb before 2.11 cannot read a workspace with resolver 3. So the package is made from a manifest of its
 # own, with the metadata of this crate and links to its files.
@@ -81,7 +89,8 @@ for architecture; do
             fail "no linker for $target: apt install gcc-aarch64-linux-gnu"
         build --target "$target" "${features[@]}"
         stage "target/$target/$profile/gleaner" "target/$target/release"
-        # The profile strips the program. cargo-deb would call the strip of this machine, which does not know the other's binaries.
+        # cargo-deb would call the strip of this machine, which does not know the other's binaries.
+        strip_for "$architecture" "$out/stage/firmware/companion/target/$target/release/gleaner"
         (cd "$out/stage/firmware/companion" && cargo deb --no-build --no-strip --target "$target" --output "$out")
     fi
     static=$rust-unknown-linux-musl
@@ -89,6 +98,7 @@ for architecture; do
         build --target "$static" --no-default-features
         if [[ -f target/$static/$profile/gleaner ]]; then
             cp "target/$static/$profile/gleaner" "$out/gleaner-$architecture-static"
+            strip_for "$architecture" "$out/gleaner-$architecture-static"
         fi
     else
         echo "no static binary for $architecture: rustup target add $static" >&2

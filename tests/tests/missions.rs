@@ -51,6 +51,17 @@ fn the_json_report_has_the_documented_keys() {
     assert_eq!(report["engine"], "native");
 }
 
+/// At nominal consumption the learned battery prices stay nominal, so that no flight goes home early.
+#[test]
+fn nominal_flights_spend_their_budget_on_data() {
+    for autopilot in ["ardupilot", "px4"] {
+        for seed in ["3", "5"] {
+            let report = fly(&["--preference", "0.9", "--seed", seed, "--autopilot-kind", autopilot]);
+            assert!(report["collected"].as_f64().unwrap() > 0.95, "{autopilot}: {report}");
+        }
+    }
+}
+
 #[test]
 fn at_w_0_the_shortest_way_is_flown() {
     for seed in ["1", "2", "3"] {

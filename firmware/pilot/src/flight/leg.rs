@@ -112,7 +112,7 @@ impl Leg {
         Leg { slot, not_before: self.not_before + slot, ..self }
     }
 
-    /// The same leg, begun by a turn or from rest.
+    /// The same leg, begun by a turn or from a hover.
     pub(crate) fn turning(self) -> Leg {
         Leg { turn_s: TURN_S, ..self }
     }
