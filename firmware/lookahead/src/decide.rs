@@ -244,8 +244,7 @@ impl<const D: usize> LookAhead<D> {
     pub fn utilities(&self, view: &View<'_>, mask: ActionMask) -> Option<[f32; Action::COUNT]> {
         let tour = self.tour.as_ref()?;
         let state = self.state(view);
-        let (links, rates, initial_units, _) = self.parts();
-        let model = Onboard { links, rates, guard: view.guard, initial_units };
+        let model = self.model(view.guard);
         let w_data = view.preference.w_data().min(W_DATA_MAX);
         let problem = Problem { model: &model, state: &state, w_data };
         Some(Action::ALL.map(|action| {
@@ -279,8 +278,14 @@ impl<const D: usize> LookAhead<D> {
         state
     }
 
-    pub(crate) const fn parts(&self) -> (&Links<D>, &Rates, f32, bool) {
-        (&self.links, &self.rates, self.initial_units, self.has_map)
+    pub(crate) const fn has_map(&self) -> bool {
+        self.has_map
+    }
+
+    /// The model of the mission as it is known now.
+    pub(crate) const fn model<'a>(&'a self, guard: &'a Guard) -> Onboard<'a, D> {
+        let LookAhead { links, rates, initial_units, .. } = self;
+        Onboard { links, rates, guard, initial_units: *initial_units }
     }
 
     pub(crate) fn rng(&self) -> XorShiftRng {

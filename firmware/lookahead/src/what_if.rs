@@ -1,7 +1,7 @@
 //! What-if: the path from here under other preferences, with the data and energy expected of it.
 
 use crate::decide::W_DATA_MAX;
-use crate::{Budget, Effort, Expected, LookAhead, Onboard, Problem, STOPS_MAX, Tour, View};
+use crate::{Budget, Effort, Expected, LookAhead, Problem, STOPS_MAX, Tour, View};
 use gleaner_units::{Action, Cell};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -41,11 +41,10 @@ impl<const D: usize> LookAhead<D> {
     /// Five times `budget.tours` mean flights.
     #[must_use]
     pub fn what_if(&self, view: &View<'_>, budget: Budget) -> Option<[Outlook; 5]> {
-        let (links, rates, initial_units, has_map) = self.parts();
-        if !has_map {
+        if !self.has_map() {
             return None;
         }
-        let model = Onboard { links, rates, guard: view.guard, initial_units };
+        let model = self.model(view.guard);
         let state = self.state(view);
         let mut rng = self.rng();
         let mut tour = Tour::HOME;

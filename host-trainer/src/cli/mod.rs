@@ -19,12 +19,11 @@ pub use session::Interrupted;
 
 use anyhow::{Context, Result};
 use clap::{ArgMatches, CommandFactory, FromArgMatches, Parser, Subcommand};
-use gleaner_host_trainer::export::read_actor;
+use gleaner_host_trainer::export::read_policy;
 use gleaner_host_trainer::keep::snapshot::Snapshot;
 use gleaner_host_trainer::keep::whole;
 use gleaner_host_trainer::settings::Settings;
 use gleaner_host_trainer::systems::{self, System};
-use gleaner_policy::onnx;
 use std::path::Path;
 
 /// Trains, evaluates and exports policies for Gleaner.
@@ -39,8 +38,8 @@ struct Arguments {
 enum Command {
     /// Train a policy by trial and error; continues from the checkpoint in --out if there is one.
     Train(Box<train::Arguments>),
-    /// Train a policy to imitate a planner, the look-ahead or trained policies; continues as train does. Of the settings it uses the
-    /// missions, the batch (batch x preferences examples), the replay capacity and the learning rates.
+    /// Train a policy to imitate a planner, the look-ahead or trained policies; continues as train does. Of the settings it
+    /// uses the missions, the batch (batch x preferences examples), the replay capacity and the learning rates.
     Distil(Box<distil::Arguments>),
     /// Refine a trained policy from its own flights (proximal policy optimisation); continues as train does.
     Refine(Box<refine::Arguments>),
@@ -100,17 +99,16 @@ fn policy_of(path: &Path) -> Result<Snapshot> {
         return snapshot_of(System::Gleaner, path);
     }
     let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
-    let actor = read_actor(&bytes).with_context(|| path.display().to_string())?;
-    let (_, info, _) = onnx::unseal(&bytes).with_context(|| path.display().to_string())?;
+    let (actor, card) = read_policy(&bytes).with_context(|| path.display().to_string())?;
     // The model holds its whole command, settings included.
-    let method = info.card.command.trim_start_matches("gleaner-train ").replace(" --out RUN", "");
+    let method = card.command.trim_start_matches("gleaner-train ").replace(" --out RUN", "");
     Ok(Snapshot {
         system: System::Gleaner.name().to_owned(),
         method,
         settings: Settings::default(),
         actor,
         update: 0,
-        steps: info.card.steps,
+        steps: card.steps,
         score: f64::NEG_INFINITY,
     })
 }

@@ -35,6 +35,13 @@ impl Distribution {
         Distribution::new(&logits.map(|logit| logit / heat), mask)
     }
 
+    /// A label from the utilities of the actions: [`Distribution::heated`], in which no action is more probable than `advice`.
+    #[must_use]
+    pub fn label(mut utilities: [f32; ACTIONS], heat: f32, advice: Action, mask: ActionMask) -> Distribution {
+        utilities[advice.index()] = utilities.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        Distribution::heated(&utilities, heat, mask)
+    }
+
     /// The best allowed action with probability `1 - epsilon`, else a uniform allowed one.
     #[must_use]
     pub fn epsilon_greedy(epsilon: f32, scores: &[f32; ACTIONS], mask: ActionMask) -> Distribution {

@@ -115,9 +115,17 @@ pub fn golden_pairs(actor: &[f32], shape: Shape, observations: &[Tokens]) -> Vec
 /// The parameter vector of a model that [`export`] wrote, for [`Shape::actor`].
 ///
 /// # Errors
-/// The file is damaged or of another contract, or lacks a weight.
+/// As [`read_policy`].
 pub fn read_actor(bytes: &[u8]) -> Result<Vec<f32>, ModelError> {
-    let (model, _, _) = onnx::unseal(bytes)?;
+    read_policy(bytes).map(|(actor, _)| actor)
+}
+
+/// [`read_actor`], and the model's origin.
+///
+/// # Errors
+/// The file is damaged or of another contract, or lacks a weight.
+pub fn read_policy(bytes: &[u8]) -> Result<(Vec<f32>, ModelCard), ModelError> {
+    let (model, info, _) = onnx::unseal(bytes)?;
     let weights = model.graph.map(|graph| graph.initializer).unwrap_or_default();
     let mut actor = Vec::with_capacity(Shape::actor().parameter_count());
     for tensor in Shape::actor().tensors() {
@@ -129,7 +137,7 @@ pub fn read_actor(bytes: &[u8]) -> Result<Vec<f32>, ModelError> {
         }
         actor.extend(numbers.iter().map(|&bytes| f32::from_le_bytes(bytes)));
     }
-    Ok(actor)
+    Ok((actor, info.card))
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Distillation: the actor imitates a teacher from its own observations.
 //!
-//! The teacher ([`Teaching`]) is a planner with full knowledge, the look-ahead that flies, which knows what the student is told,
-//! or an ensemble of trained policies (mentors), each evaluated in the eight views of the state. The errors of a network differ from view to view, so the mean of its logits is better than
-//! each of them, and a student of the mean keeps the gain (ensemble distillation: Hinton, Vinyals and Dean 2015).
+//! The teacher ([`Teaching`]) is a planner with full knowledge, the look-ahead that flies, which knows what the student is
+//! told, or an ensemble of trained policies (mentors), each evaluated in the eight views of the state. The errors of a
+//! network differ from view to view, so the mean of its logits is better than each of them, and a student of the mean keeps
+//! the gain (ensemble distillation: Hinton, Vinyals and Dean 2015).
 //!
 //! The student flies and the teacher labels every state (DAgger: Ross, Gordon and Bagnell 2011), so that the student is
 //! trained on the states that it visits. Each example is used in a random view. The loss is the cross entropy between the
@@ -227,7 +228,7 @@ impl Distillation {
         for (index, (state, logits)) in states.into_iter().zip(logits).enumerate() {
             let (flight, lessons) = &mut self.flights[index];
             let (mask, preference) = (flight.mask(), flight.preference());
-            let (advice, target) = lessons.label(flight, &logits, mentors.get(index))?;
+            let (advice, target) = lessons.label(flight, mentors.get(index).unwrap_or(&logits))?;
             // The student acts as on board, so that the states are those of the finished policy.
             let own = mask.argmax(&logits).unwrap_or(advice);
             let action = if self.rng.random_bool(student_share) { own } else { advice };

@@ -57,19 +57,17 @@ impl Teaching {
 }
 
 impl Lessons {
-    /// The teacher's action in the present state, and the probability of each action. `own`: the student's logits; `mentors`:
-    /// the mean logits of the mentors, if it has any.
+    /// The teacher's action in the present state, and the probability of each action. `logits`: the mean of the mentors, or of
+    /// the student if there are none.
     pub(super) fn label(
         &mut self,
         flight: &Flight,
-        own: &[f32; ACTIONS],
-        mentors: Option<&[f32; ACTIONS]>,
+        logits: &[f32; ACTIONS],
     ) -> Result<(Action, [f32; ACTIONS]), DeciderError> {
         match self {
             Lessons::Planner(course) => Ok(course.teach(flight)),
-            Lessons::LookAhead(lookahead, budget) => improve(lookahead, flight, own, *budget),
+            Lessons::LookAhead(lookahead, budget) => improve(lookahead, flight, logits, *budget),
             Lessons::Mentors => {
-                let logits = mentors.unwrap_or(own);
                 let advice = flight.mask().argmax(logits).ok_or_else(not_a_number)?;
                 Ok((advice, Distribution::new(logits, flight.mask()).probability))
             }
@@ -89,9 +87,8 @@ fn improve(
     let choice = lookahead.propose(&view, logits, mask, budget).ok_or_else(not_a_number)?;
     // Without a plan the student's own action stays.
     let utilities = lookahead.utilities(&view, mask).unwrap_or(*logits);
-    let mut labels = utilities.map(|utility| utility / IMPROVED_TEMPERATURE);
-    labels[choice.action.index()] = labels.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    Ok((choice.action, Distribution::new(&labels, mask).probability))
+    let label = Distribution::label(utilities, IMPROVED_TEMPERATURE, choice.action, mask);
+    Ok((choice.action, label.probability))
 }
 
 fn not_a_number() -> DeciderError {

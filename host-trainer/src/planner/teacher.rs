@@ -135,7 +135,7 @@ impl Course {
         let (advice, start, devices) = self.plan(flight);
         let tour = self.tour.clone().unwrap_or_default();
         let guard = flight.guard();
-        let mut logits = [f32::NEG_INFINITY; Action::COUNT];
+        let mut utilities = [f32::NEG_INFINITY; Action::COUNT];
         for action in flight.mask().iter() {
             let mut next = MeanFlight::begin(&start);
             self.slot(&mut next, action);
@@ -143,12 +143,9 @@ impl Course {
             if !ends {
                 self.finish(&mut next, guard, &devices, &tour);
             }
-            logits[action.index()] = self.utility(&start, &next) / LABEL_TEMPERATURE;
+            utilities[action.index()] = self.utility(&start, &next);
         }
-        // No action gets a higher probability than the search's result.
-        let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        logits[advice.index()] = highest;
-        (advice, Distribution::new(&logits, flight.mask()).probability)
+        (advice, Distribution::label(utilities, LABEL_TEMPERATURE, advice, flight.mask()).probability)
     }
 
     fn plan<'a>(&mut self, flight: &'a Flight) -> (Action, Start<'a>, Vec<Cell>) {
