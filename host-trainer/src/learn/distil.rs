@@ -24,7 +24,6 @@ use crate::observe::Encoding;
 use crate::observe::tokens::{Observation, PolicyTokens};
 use crate::planner::teacher::Teacher;
 use crate::settings::Settings;
-use gleaner_lookahead::Budget;
 use gleaner_policy::{Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::ScenarioKind;
@@ -130,30 +129,6 @@ struct Stored {
     rng_word: u128,
 }
 
-/// The chain of commands that ends with this run, without its settings.
-fn method(from: Option<&Snapshot>, teaching: &Teaching) -> String {
-    let whole = |snapshot: &Snapshot, out: &str| {
-        snapshot.command_line(out).trim_start_matches("gleaner-train ").to_owned()
-    };
-    let mut method = from.map_or("distil".to_owned(), |from| {
-        format!("{} && gleaner-train distil --from FIRST", whole(from, "FIRST"))
-    });
-    let mentors = match teaching {
-        Teaching::Planner => [].as_slice(),
-        Teaching::LookAhead(Budget { tours }) => return method + &format!(" --lookahead {tours}"),
-        Teaching::Mentors(mentors) => mentors,
-    };
-    for (index, mentor) in mentors.iter().enumerate() {
-        if from.is_some_and(|from| from.actor == mentor.actor) {
-            method += " --mentor FIRST";
-        } else {
-            let name = format!("MENTOR{index}");
-            method = format!("{} && gleaner-train {method} --mentor {name}", whole(mentor, &name));
-        }
-    }
-    method
-}
-
 impl Distillation {
     /// Continues from the checkpoint in `folder`, or starts with the actor of `from` if given.
     ///
@@ -177,7 +152,7 @@ impl Distillation {
         let mut run = Distillation {
             planner: Teacher::new(site.world().clone()),
             validation: Validation::draw(&site, &settings)?,
-            method: method(from, &teaching),
+            method: teaching.method(from),
             constants: DistilSettings::DEFAULT,
             teaching,
             settings,

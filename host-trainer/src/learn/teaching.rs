@@ -35,6 +35,30 @@ pub(super) enum Lessons {
 }
 
 impl Teaching {
+    /// The chain of commands that ends with this run, without its settings.
+    pub(super) fn method(&self, from: Option<&Snapshot>) -> String {
+        let whole = |snapshot: &Snapshot, out: &str| {
+            snapshot.command_line(out).trim_start_matches("gleaner-train ").to_owned()
+        };
+        let mut method = from.map_or("distil".to_owned(), |from| {
+            format!("{} && gleaner-train distil --from FIRST", whole(from, "FIRST"))
+        });
+        let mentors = match self {
+            Teaching::Planner => [].as_slice(),
+            Teaching::LookAhead(Budget { tours }) => return method + &format!(" --lookahead {tours}"),
+            Teaching::Mentors(mentors) => mentors,
+        };
+        for (index, mentor) in mentors.iter().enumerate() {
+            if from.is_some_and(|from| from.actor == mentor.actor) {
+                method += " --mentor FIRST";
+            } else {
+                let name = format!("MENTOR{index}");
+                method = format!("{} && gleaner-train {method} --mentor {name}", whole(mentor, &name));
+            }
+        }
+        method
+    }
+
     /// The teacher at the begin of this flight. `seed`: of the look-ahead's search.
     pub(super) fn begin(
         &self,
