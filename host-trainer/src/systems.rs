@@ -16,14 +16,14 @@
 //! 40 x 30 grid centred and pooled by 5 does not give, and a preference of one number. The paper takes MOSAC-FTV from
 //! earlier work without its sizes; it has the same hidden layers here.
 
-use crate::judge::evaluation::{Decider, Network};
+use crate::judge::evaluation::Decider;
 use crate::keep::checkpoint::CheckpointError;
 use crate::keep::snapshot::{SNAPSHOT, Snapshot};
 use crate::learn::algorithm::Algorithm;
 use crate::learn::ddqn::Ddqn;
 use crate::learn::mosac::Mosac;
 use crate::learn::policy::NetworkPolicy;
-use crate::net::{Architecture, Shape};
+use crate::net::Architecture;
 use crate::observe::layers::LayeredTokens;
 use crate::observe::maps::Maps;
 use crate::observe::paper_tokens::PaperTokens;
@@ -151,11 +151,13 @@ impl System {
     /// The policy of a snapshot of this system, for evaluations in any city.
     #[must_use]
     pub fn policy(self, snapshot: &Snapshot) -> Box<dyn Decider + '_> {
-        match self {
-            // The same decisions, and it shows its attention.
-            System::Gleaner => Box::new(Network::new(Shape::actor(), &snapshot.actor)),
-            _ => with_algorithm!(self, A => Box::new(NetworkPolicy::<A>::new(&snapshot.actor))),
-        }
+        with_algorithm!(self, A => Box::new(NetworkPolicy::<A>::new(&snapshot.actor)))
+    }
+
+    /// Whether its network has attention.
+    #[must_use]
+    pub const fn has_attention(self) -> bool {
+        matches!(self, System::Gleaner | System::MosacAtt | System::MosacAttLayers)
     }
 
     /// Whether its models can be exported for the aircraft.

@@ -29,7 +29,16 @@ fn run_folder(folder: &Path) {
         score: 1.0,
     };
     learned.save(folder).unwrap();
-    fs::write(folder.join(CURVE), "{\"update\":10,\"unix_s\":1.5,\"rd/hypervolume\":5000.5}\n").unwrap();
+    curve(folder, 60.0);
+}
+
+/// A folder with a learning curve of one point.
+fn curve(folder: &Path, coverage_percent: f64) {
+    let point = serde_json::json!({
+        "update": 10, "unix_s": 1.5, "steps": 40, "rd/hypervolume": 5000.5, "rd/coverage_percent": coverage_percent,
+    });
+    fs::create_dir_all(folder).unwrap();
+    fs::write(folder.join(CURVE), format!("{point}\n")).unwrap();
 }
 
 fn report(arguments: &[&str]) -> Output {
@@ -59,9 +68,19 @@ fn report_makes_page_and_csv_and_reuses_its_parts() {
         "upper_bound_percent": [97.25],
     });
     fs::write(&oracle, format!("{line}\n")).unwrap();
+    // Two seeds of one training.
+    let seeds = [61.25, 63.25].map(|coverage| {
+        let seed = folder.path().join(coverage.to_string());
+        curve(&seed, coverage);
+        format!("two seeds={}", seed.display())
+    });
     let arguments = [
         "--run",
         &format!("untrained={}", run.display()),
+        "--curve",
+        &seeds[0],
+        "--curve",
+        &seeds[1],
         "--oracle",
         oracle.to_str().unwrap(),
         "--realizations",
@@ -78,8 +97,18 @@ fn report_makes_page_and_csv_and_reuses_its_parts() {
     for outside in ["http://", "https://", "<script", "<link", "src=", "url("] {
         assert!(!page.contains(outside), "the page asks for {outside}");
     }
-    for shown in ["untrained", "GREEDY", "ORACLE", "97.2", "about 87", "not computed", "87.49 ± 0.16", "5000"]
-    {
+    for shown in [
+        "untrained",
+        "GREEDY",
+        "ORACLE",
+        "97.2",
+        "about 87",
+        "not computed",
+        "87.49 ± 0.16",
+        "5000",
+        "two seeds",
+        "62.2 ± 1.4",
+    ] {
         assert!(page.contains(shown), "{shown} is not on the page");
     }
     let lines = |name: &str| fs::read_to_string(out.join(name)).unwrap().lines().count() - 1;
@@ -87,7 +116,7 @@ fn report_makes_page_and_csv_and_reuses_its_parts() {
     assert_eq!((lines("metrics.csv"), lines("fronts.csv"), lines("missions.csv")), (21, 231, 231));
     // Two scenarios, two channels, two repeats; two preferences, four kinds or 15 x 15 tokens.
     assert_eq!((lines("fading.csv"), lines("attention.csv"), lines("attention_initial.csv")), (8, 8, 450));
-    assert_eq!((lines("engines.csv"), lines("curves.csv")), (2, 1));
+    assert_eq!((lines("engines.csv"), lines("curves.csv"), lines("trainings.csv")), (2, 3, 1));
     assert!(lines("trajectories.csv") > 6 && lines("published.csv") > 20);
 
     // Only a damaged part is measured again, with a message and the same numbers.

@@ -1,5 +1,6 @@
 //! The command line: one file per command.
 
+mod chosen;
 mod compare;
 mod distil;
 mod evaluate;

@@ -1,5 +1,6 @@
 //! `gleaner-train report`.
 
+use super::chosen::Chosen;
 use super::site::{SiteArguments, fingerprint};
 use super::subject::Subject;
 use super::{oracle, write_whole};
@@ -9,11 +10,9 @@ use gleaner_host_trainer::judge::evaluation::{fly_all, fly_greedy, test_preferen
 use gleaner_host_trainer::judge::explanation::{track, watch};
 use gleaner_host_trainer::judge::paper::Setting;
 use gleaner_host_trainer::judge::robustness::{repeat_flights, world_with};
-use gleaner_host_trainer::keep::curves;
 use gleaner_host_trainer::keep::parts::{Parts, Source};
 use gleaner_host_trainer::planner::oracle::OracleSetting;
 use gleaner_host_trainer::report::{self, Detail, Report};
-use gleaner_host_trainer::systems::System;
 use gleaner_policy::Preference;
 use gleaner_units::BatteryUnits;
 use gleaner_world::{Fading, Realization, ScenarioKind, Seed};
@@ -22,22 +21,20 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs;
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
-
-/// Defaults: the shipped model, and a folder for each of the paper's systems.
-const SHIPPED: &str = "models/gleaner.onnx";
-const SHIPPED_RUNS: &str = "models/paper";
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
     /// An ONNX model, in the engine that flies it on board; NAME=FILE gives it a name. Repeatable. The first system of
-    /// all is measured in detail: fading, attention, trajectories. Without --model and --run: all systems in models/.
+    /// all and those with attention are measured in detail: fading, attention, trajectories. Without --model and --run:
+    /// all that is in models/.
     #[arg(long, value_name = "[NAME=]FILE")]
     model: Vec<String>,
     /// The folder of a run: its best parameters and its learning curve; NAME=FOLDER gives it a name. Repeatable.
     #[arg(long, value_name = "[NAME=]FOLDER")]
     run: Vec<String>,
-    /// The folder of a run of which the report shows the learning curve only. Repeatable.
+    /// The folder of a run of which the report shows the learning curve only. Repeatable: curves of the same NAME are
+    /// seeds of one training and become a mean with a standard deviation.
     #[arg(long, value_name = "[NAME=]FOLDER")]
     curve: Vec<String>,
     /// A file of `gleaner-train oracle`, for every table [default: the shipped one].
@@ -63,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.realizations == 0 {
         bail!("--realizations 0: no mission to fly; give at least 1");
     }
-    let chosen = Chosen::by(arguments);
+    let chosen = Chosen::by(&arguments.model, &arguments.run, &arguments.curve);
     let mut systems = chosen.systems()?;
     let is_default_site = arguments.site.is_default();
     // The oracle's file is about the default city.
@@ -72,25 +69,33 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         named => oracle::read_or_shipped(named.as_deref())?,
     };
     let oracle = same_realizations(&lines, arguments.realizations);
-    let curves = chosen.curves()?;
-    let measurement = Measurement::open(arguments, systems.len())?;
+    let (curves, trainings) = (chosen.curves()?, chosen.trainings()?);
+    let detailed = systems.iter().enumerate().filter(|(place, system)| is_detailed(*place, system)).count();
+    let measurement = Measurement::open(arguments, systems.len(), detailed)?;
     let mut shown = vec![measurement.greedy()?];
     for system in &mut systems {
         shown.push(measurement.evaluate(system)?);
     }
-    let detail = systems.first_mut().map(|system| measurement.detail(system)).transpose()?;
+    let mut details = Vec::new();
+    for (place, system) in systems.iter_mut().enumerate() {
+        if is_detailed(place, system) {
+            details.push(measurement.detail(system)?);
+        }
+    }
     measurement.bar.finish_and_clear();
     let world = measurement.site.world();
     let report = Report {
         command: command_line(),
         machine: machine(),
         realizations: arguments.realizations,
+        example: arguments.example,
         heights: world.city().heights().clone(),
         city_hash: world.city().fingerprint(),
         systems: shown,
         oracle,
-        detail,
+        details,
         curves,
+        trainings,
     };
     for (name, text) in report::files(&report) {
         write_whole(&arguments.out.join(name), text.as_bytes())?;
@@ -99,6 +104,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     write_whole(&page, report::page(&report).as_bytes())?;
     println!("wrote {}, and the CSV files beside it", page.display());
     Ok(())
+}
+
+/// Whether a system is measured in detail.
+fn is_detailed(place: usize, system: &Subject) -> bool {
+    place == 0 || system.policy.has_attention()
 }
 
 /// Measures parts and shows the progress.
@@ -110,10 +120,11 @@ struct Measurement<'a> {
 }
 
 impl<'a> Measurement<'a> {
-    fn open(arguments: &'a Arguments, systems: usize) -> Result<Measurement<'a>> {
+    fn open(arguments: &'a Arguments, systems: usize, detailed: usize) -> Result<Measurement<'a>> {
         let parts = Parts::open(&arguments.out.join("parts"))?;
-        let closer = if systems == 0 { 0 } else { 4 + 2 + 2 };
-        let bar = ProgressBar::new((Setting::ALL.len() * (systems + 1) + systems + closer) as u64);
+        let parts_of_detail = 4 + 2 + 2;
+        let count = Setting::ALL.len() * (systems + 1) + systems + detailed * parts_of_detail;
+        let bar = ProgressBar::new(count as u64);
         let style = ProgressStyle::with_template("{bar:30} {pos}/{len} parts, {elapsed}, now {msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Ok(Measurement { arguments, site: arguments.site.site()?, parts, bar })
@@ -204,16 +215,11 @@ impl<'a> Measurement<'a> {
         })
     }
 
-    /// The measurements of the first system only. The paper makes them for MOSAC-ATT.
+    /// The measurements that the paper makes for MOSAC-ATT only.
     fn detail(&self, system: &mut Subject) -> Result<Detail> {
         let (name, identity) = (system.name.clone(), system.identity.clone());
-        let mut detail = Detail {
-            system: name.clone(),
-            fading: Vec::new(),
-            gazes: Vec::new(),
-            tracks: Vec::new(),
-            example: self.arguments.example,
-        };
+        let mut detail =
+            Detail { system: name.clone(), fading: Vec::new(), gazes: Vec::new(), tracks: Vec::new() };
         let repeats = self.arguments.fading_repeats;
         for kind in ScenarioKind::ALL {
             let drawn = self.draw(Setting::trained(kind))?;
@@ -266,86 +272,10 @@ fn name(setting: Setting) -> String {
     format!("{}, K = {}, B = {}", setting.scenario_name(), setting.devices, setting.battery)
 }
 
-/// A name, if given, and a path.
-type Named = (Option<String>, PathBuf);
-
-/// The subjects of the report.
-struct Chosen {
-    models: Vec<Named>,
-    runs: Vec<Named>,
-    curves: Vec<Named>,
-}
-
-impl Chosen {
-    fn by(arguments: &Arguments) -> Chosen {
-        let named = |list: &[String]| list.iter().map(|argument| named(argument)).collect();
-        let mut chosen = Chosen {
-            models: named(&arguments.model),
-            runs: named(&arguments.run),
-            curves: named(&arguments.curve),
-        };
-        if chosen.models.is_empty() && chosen.runs.is_empty() {
-            let runs = System::ALL
-                .map(|system| (Some(system.title().to_owned()), Path::new(SHIPPED_RUNS).join(system.name())));
-            chosen.models.push((None, SHIPPED.into()));
-            chosen.runs.extend(runs.into_iter().filter(|(_, folder)| folder.is_dir()));
-        }
-        chosen
-    }
-
-    fn systems(&self) -> Result<Vec<Subject>> {
-        let mut systems = Vec::new();
-        for (name, path) in &self.models {
-            systems.push(Subject::model(name.as_deref(), path)?);
-        }
-        for (name, folder) in &self.runs {
-            systems.push(Subject::run(name.as_deref(), folder)?);
-        }
-        for (index, system) in systems.iter().enumerate() {
-            if systems[..index].iter().any(|other| other.name == system.name) {
-                bail!(
-                    "two systems have the name {}; name them with --model NAME=FILE or --run NAME=FOLDER",
-                    system.name
-                );
-            }
-        }
-        Ok(systems)
-    }
-
-    /// The learning curves. A --run may have none yet, a --curve must have one.
-    fn curves(&self) -> Result<Vec<(String, Vec<curves::Point>)>> {
-        let of = |(name, folder): &Named| -> Result<(String, Vec<curves::Point>)> {
-            if !folder.is_dir() {
-                bail!("{}: no such folder; check --run and --curve", folder.display());
-            }
-            let fallback = || folder.file_name().unwrap_or(folder.as_os_str()).display().to_string();
-            Ok((name.clone().unwrap_or_else(fallback), curves::read(folder)?))
-        };
-        let mut all = self.runs.iter().map(of).collect::<Result<Vec<_>>>()?;
-        for named in &self.curves {
-            let curve = of(named)?;
-            if curve.1.is_empty() {
-                let folder = named.1.display();
-                bail!("{folder}: no learning curve yet; wait for its first point, or check --curve");
-            }
-            all.push(curve);
-        }
-        Ok(all)
-    }
-}
-
 /// The oracle on the realizations of the report, so that means are over the same missions. Settings with fewer
 /// realizations are left out.
 fn same_realizations(lines: &[OracleSetting], count: u64) -> Vec<OracleSetting> {
     lines.iter().filter_map(|line| line.first(count)).collect()
-}
-
-/// `NAME=PATH`, or a path alone.
-fn named(argument: &str) -> Named {
-    match argument.split_once('=') {
-        Some((name, path)) => (Some(name.to_owned()), path.into()),
-        None => (None, argument.into()),
-    }
 }
 
 /// The command line of this program.

@@ -76,6 +76,14 @@ impl Subject {
 }
 
 impl SubjectPolicy {
+    /// Whether its network has attention.
+    pub const fn has_attention(&self) -> bool {
+        match self {
+            SubjectPolicy::Tract(_) => true,
+            SubjectPolicy::Run(system, _) => system.has_attention(),
+        }
+    }
+
     /// For evaluations.
     pub fn decider(&mut self) -> Box<dyn Decider + '_> {
         match self {

@@ -55,6 +55,12 @@ pub struct Point {
 }
 
 impl Point {
+    /// Environment steps flown; `None` where the file has no number of them.
+    #[must_use]
+    pub fn steps(&self) -> Option<u64> {
+        self.scalars.get("steps").map(|&steps| steps as u64)
+    }
+
     fn line(&self) -> String {
         let mut object = Map::new();
         object.insert("update".into(), self.update.into());

@@ -5,7 +5,7 @@ use crate::learn::replay::Transition;
 use crate::net::{Adam, Architecture, Samples};
 use crate::observe::{BatchOf, Encoding, WorkspaceOf};
 use crate::settings::Settings;
-use gleaner_policy::Preference;
+use gleaner_policy::{Attention, Preference};
 use gleaner_units::ActionMask;
 use rand_chacha::ChaCha8Rng;
 use serde::de::DeserializeOwned;
@@ -166,5 +166,12 @@ impl<E: Encoding> Inference<E> {
             encoding.push(state, &[preference], &mut self.batch);
         }
         self.network.forward(parameters, &self.batch, &mut self.workspace)
+    }
+
+    /// Attention in the last layer, if the last call of [`Inference::outputs`] had one state. `None` for a network without
+    /// attention.
+    #[must_use]
+    pub fn attention(&self) -> Option<Attention> {
+        E::Network::attention(&self.workspace).map(Attention)
     }
 }

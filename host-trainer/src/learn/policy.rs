@@ -4,6 +4,7 @@ use crate::env::flight::Flight;
 use crate::judge::evaluation::{Decider, DeciderError};
 use crate::learn::algorithm::{Algorithm, Inference};
 use crate::observe::Encoding;
+use gleaner_policy::Attention;
 use gleaner_units::Action;
 
 /// Takes the allowed action with the highest score.
@@ -20,24 +21,31 @@ impl<'a, A: Algorithm> NetworkPolicy<'a, A> {
     pub fn new(parameters: &'a [f32]) -> NetworkPolicy<'a, A> {
         NetworkPolicy { parameters, inference: Inference::new(A::network()), encoding: None }
     }
+
+    /// The outputs, `[flights, outputs]`, for at least one flight.
+    fn outputs(&mut self, flights: &[&Flight]) -> &[f32] {
+        let first = flights[0];
+        assert!(
+            flights.iter().all(|flight| flight.shares_map(first)),
+            "all flights of a batch must have the same map"
+        );
+        let known = self.encoding.take().filter(|(known, _)| known.shares_map(first));
+        let (_, encoding) =
+            self.encoding.insert(known.unwrap_or_else(|| (first.clone(), A::Encoding::of(first.map()))));
+        let observed: Vec<_> = flights.iter().map(|flight| encoding.observe(flight)).collect();
+        let states = observed.iter().zip(flights).map(|(state, flight)| (state, flight.preference()));
+        self.inference.outputs(encoding, self.parameters, states)
+    }
 }
 
 impl<A: Algorithm> Decider for NetworkPolicy<'_, A> {
     /// # Panics
     /// When the flights have different maps.
     fn decide(&mut self, flights: &[&Flight]) -> Result<Vec<Action>, DeciderError> {
-        let Some(first) = flights.first() else { return Ok(Vec::new()) };
-        assert!(
-            flights.iter().all(|flight| flight.shares_map(first)),
-            "all flights of a batch must have the same map"
-        );
-        if !self.encoding.as_ref().is_some_and(|(known, _)| known.shares_map(first)) {
-            self.encoding = Some(((*first).clone(), A::Encoding::of(first.map())));
+        if flights.is_empty() {
+            return Ok(Vec::new());
         }
-        let Some((_, encoding)) = &self.encoding else { return Ok(Vec::new()) };
-        let observed: Vec<_> = flights.iter().map(|flight| encoding.observe(flight)).collect();
-        let states = observed.iter().zip(flights).map(|(state, flight)| (state, flight.preference()));
-        let outputs = self.inference.outputs(encoding, self.parameters, states);
+        let outputs = self.outputs(flights);
         let outputs = outputs.chunks_exact(outputs.len() / flights.len());
         flights
             .iter()
@@ -48,5 +56,10 @@ impl<A: Algorithm> Decider for NetworkPolicy<'_, A> {
                 action.ok_or_else(|| DeciderError("the network's output is not a number".into()))
             })
             .collect()
+    }
+
+    fn attention(&mut self, flight: &Flight) -> Result<Option<Attention>, DeciderError> {
+        self.outputs(&[flight]);
+        Ok(self.inference.attention())
     }
 }

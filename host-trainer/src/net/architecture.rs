@@ -1,7 +1,7 @@
 //! The interface between a learning algorithm and a network.
 
 use super::batch::Batch;
-use super::shape::{Shape, Tensor};
+use super::shape::{Shape, TOKENS_MAX, Tensor};
 use super::workspace::Workspace;
 use super::{passes, shape};
 use rand_chacha::ChaCha8Rng;
@@ -53,6 +53,12 @@ pub trait Architecture: Copy + Debug {
         loss: impl FnMut(Range<usize>, &[f32], &mut [f32]),
         gradients: &mut [f32],
     ) -> &'a [f32];
+
+    /// Attention in the last layer after [`Architecture::forward`] of a batch of one sample, as [`Workspace::attention`]
+    /// gives it. `None` for a network without attention.
+    fn attention(_: &Self::Workspace) -> Option<[[f32; TOKENS_MAX]; TOKENS_MAX]> {
+        None
+    }
 
     /// Length of the flat parameter vector.
     fn parameter_count(&self) -> usize {
@@ -106,5 +112,9 @@ impl Architecture for Shape {
     ) -> &'a [f32] {
         passes::forward_backward(self, parameters, batch, workspace, loss, gradients);
         workspace.outputs()
+    }
+
+    fn attention(workspace: &Workspace) -> Option<[[f32; TOKENS_MAX]; TOKENS_MAX]> {
+        Some(workspace.attention(0))
     }
 }

@@ -141,6 +141,8 @@ pub(super) enum Joined {
     Not,
     Line,
     LineWithoutMarks,
+    /// A line, and a band of the spread around it.
+    Band,
     /// Bars from zero.
     Bars,
 }
@@ -189,10 +191,11 @@ pub(super) fn plot(
 }
 
 fn drawn(series: &Series, at_x: &dyn Fn(f64) -> f64, at_y: &dyn Fn(f64) -> f64) -> Markup {
-    let joined = matches!(series.joined, Joined::Line | Joined::LineWithoutMarks);
+    let joined = matches!(series.joined, Joined::Line | Joined::LineWithoutMarks | Joined::Band);
     let way: Vec<String> =
         series.spots.iter().map(|spot| format!("{},{}", px(at_x(spot.x)), px(at_y(spot.y)))).collect();
     html! {
+        @if series.joined == Joined::Band && way.len() > 1 { polygon.band points=(band(series, at_x, at_y)) {} }
         @if joined && way.len() > 1 { polyline.line points=(way.join(" ")) {} }
         @for spot in &series.spots {
             @let (x, y) = (at_x(spot.x), at_y(spot.y));
@@ -202,13 +205,21 @@ fn drawn(series: &Series, at_x: &dyn Fn(f64) -> f64, at_y: &dyn Fn(f64) -> f64) 
                     title { (spot.said) }
                 }
             } @else if series.joined != Joined::LineWithoutMarks {
-                @if spot.spread > 0.0 {
+                @if spot.spread > 0.0 && series.joined != Joined::Band {
                     line.spread x1=(px(x)) x2=(px(x)) y1=(px(at_y(spot.y - spot.spread))) y2=(px(at_y(spot.y + spot.spread))) {}
                 }
                 path.mark d=(outline(series.look.shape, x, y)) { title { (spot.said) } }
             }
         }
     }
+}
+
+/// The outline of a band: the upper side from left to right, the lower side back.
+fn band(series: &Series, at_x: &dyn Fn(f64) -> f64, at_y: &dyn Fn(f64) -> f64) -> String {
+    let corner = |spot: &Spot, y: f64| format!("{},{}", px(at_x(spot.x)), px(at_y(y)));
+    let upper = series.spots.iter().map(|spot| corner(spot, spot.y + spot.spread));
+    let lower = series.spots.iter().rev().map(|spot| corner(spot, spot.y - spot.spread));
+    upper.chain(lower).collect::<Vec<_>>().join(" ")
 }
 
 /// The SVG path of a mark.

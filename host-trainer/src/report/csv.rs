@@ -24,6 +24,7 @@ pub fn files(report: &Report) -> Vec<(&'static str, String)> {
         ("attention_initial.csv", attention_initial(report)),
         ("engines.csv", engines(report)),
         ("curves.csv", curves(report)),
+        ("trainings.csv", trainings(report)),
         ("published.csv", published()),
     ]
 }
@@ -125,7 +126,7 @@ fn missions(report: &Report) -> String {
 }
 
 fn fading(report: &Report) -> String {
-    let lines = report.detail.iter().flat_map(|detail| {
+    let lines = report.details.iter().flat_map(|detail| {
         detail.fading.iter().flat_map(move |(kind, regular, fading)| {
             [("regular", regular), ("Rayleigh", fading)].into_iter().flat_map(move |(channel, repeats)| {
                 let about = about(&detail.system, Setting::trained(*kind));
@@ -138,11 +139,11 @@ fn fading(report: &Report) -> String {
 }
 
 fn trajectories(report: &Report) -> String {
-    let lines = report.detail.iter().flat_map(|detail| {
+    let lines = report.details.iter().flat_map(|detail| {
         detail.tracks.iter().flat_map(move |(kind, tracks)| {
             tracks.iter().flat_map(move |track| {
                 let about = about(&detail.system, Setting::trained(*kind));
-                let (example, w) = (detail.example, track.w_data);
+                let (example, w) = (report.example, track.w_data);
                 let cells = track.cells.iter().enumerate();
                 cells.map(move |(slot, (x, y))| format!("{about},{example},{w},{slot},{x},{y}"))
             })
@@ -152,7 +153,7 @@ fn trajectories(report: &Report) -> String {
 }
 
 fn attention(report: &Report) -> String {
-    let lines = report.detail.iter().flat_map(|detail| {
+    let lines = report.details.iter().flat_map(|detail| {
         detail.gazes.iter().flat_map(move |gaze| {
             let (system, w) = (field(&detail.system), gaze.w_data);
             let shares = KINDS.into_iter().zip(gaze.along);
@@ -163,10 +164,10 @@ fn attention(report: &Report) -> String {
 }
 
 fn attention_initial(report: &Report) -> String {
-    let lines = report.detail.iter().flat_map(|detail| {
+    let lines = report.details.iter().flat_map(|detail| {
         detail.gazes.iter().flat_map(move |gaze| {
             gaze.initial.iter().enumerate().flat_map(move |(query, row)| {
-                let about = format!("{},RD,{},{}", field(&detail.system), detail.example, gaze.w_data);
+                let about = format!("{},RD,{},{}", field(&detail.system), report.example, gaze.w_data);
                 row.iter().enumerate().map(move |(key, weight)| format!("{about},{query},{key},{weight}"))
             })
         })
@@ -199,6 +200,11 @@ fn curves(report: &Report) -> String {
         })
     });
     file("run,update,name,value", lines)
+}
+
+fn trainings(report: &Report) -> String {
+    let (head, lines) = super::training::trainings_csv(report);
+    file(head, lines.into_iter().map(|fields| fields.map(|text| field(&text)).join(",")))
 }
 
 fn published() -> String {

@@ -157,7 +157,7 @@ pub(super) fn curves_legend(report: &Report) -> Markup {
     legend(&entries)
 }
 
-/// Hypervolume over updates.
+/// Hypervolume over environment steps.
 pub(super) fn curves(report: &Report, kind: ScenarioKind) -> Markup {
     let key = format!("{}/hypervolume", kind.name());
     let series: Vec<Series> = report
@@ -166,12 +166,8 @@ pub(super) fn curves(report: &Report, kind: ScenarioKind) -> Markup {
         .enumerate()
         .map(|(place, (name, points))| {
             let told = points.iter().filter_map(|point| {
-                let value = *point.scalars.get(&key)?;
-                Some(spot(
-                    point.update as f64 / 1000.0,
-                    value,
-                    format!("{name}, update {}: {value:.0}", point.update),
-                ))
+                let (value, steps) = (*point.scalars.get(&key)?, point.steps()?);
+                Some(spot(steps as f64 / 1000.0, value, format!("{name}, {steps} steps: {value:.0}")))
             });
             let spots: Vec<Spot> = told.collect();
             // Marks are readable only for few runs.
@@ -183,7 +179,7 @@ pub(super) fn curves(report: &Report, kind: ScenarioKind) -> Markup {
     if spots().next().is_none() {
         return html! { p.quiet { "None of the runs was validated in this scenario." } };
     }
-    let x = Axis::around("updates, thousands", spots().map(|spot| spot.x), [Some(0.0), None]);
+    let x = Axis::around("environment steps, thousands", spots().map(|spot| spot.x), [Some(0.0), None]);
     let y = Axis::around("hypervolume", spots().map(|spot| spot.y), [None, None]);
     plot(&format!("learning curves, {kind}"), &x, &y, &series, None)
 }

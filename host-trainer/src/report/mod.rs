@@ -10,9 +10,11 @@ mod figure;
 mod page;
 mod section;
 mod table;
+mod training;
 
 pub use csv::files;
 pub use page::page;
+pub use training::Training;
 
 pub use crate::planner::oracle::OracleSetting;
 
@@ -34,6 +36,8 @@ pub struct Report {
     pub machine: String,
     /// Evaluation realizations per setting.
     pub realizations: u64,
+    /// Number of the evaluation realization of the example figures.
+    pub example: u64,
     /// The city of the missions.
     pub heights: HeightMap,
     /// Its fingerprint.
@@ -42,10 +46,12 @@ pub struct Report {
     pub systems: Vec<System>,
     /// Results of the oracle and the bound, by setting. Settings that were not computed are missing.
     pub oracle: Vec<OracleSetting>,
-    /// Details of the first learned system.
-    pub detail: Option<Detail>,
-    /// Learning curves, by the name of the run.
+    /// Details of the first learned system and of every other one with attention.
+    pub details: Vec<Detail>,
+    /// Learning curves of the systems, by the name of the run.
     pub curves: Vec<(String, Vec<Point>)>,
+    /// Trainings that were repeated with several seeds.
+    pub trainings: Vec<Training>,
 }
 
 /// One system, flown in all settings.
@@ -101,7 +107,7 @@ impl OracleSetting {
     }
 }
 
-/// Measurements of one system only.
+/// Measurements that only some systems get.
 #[derive(Clone, Debug)]
 pub struct Detail {
     /// The system's name.
@@ -112,8 +118,14 @@ pub struct Detail {
     pub gazes: Vec<Gaze>,
     /// The missions of the example at w = 1, 0.5 and 0.
     pub tracks: Vec<(ScenarioKind, Vec<Track>)>,
-    /// Number of the example's evaluation realization.
-    pub example: u64,
+}
+
+impl Detail {
+    /// Whether the system has attention.
+    #[must_use]
+    pub fn has_attention(&self) -> bool {
+        !self.gazes.is_empty()
+    }
 }
 
 impl Report {

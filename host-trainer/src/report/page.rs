@@ -3,6 +3,7 @@
 use super::attention::attention_section;
 use super::section::section;
 use super::table::{Metric, main_table, metric_table};
+use super::training::trainings_section;
 use super::{Detail, Report, figure};
 use crate::judge::paper::{CITATIONS, EXAMPLES, Setting};
 use gleaner_world::ScenarioKind;
@@ -24,18 +25,14 @@ pub fn page(report: &Report) -> String {
                 (super::drawing::city(&report.heights))
                 (head(report))
                 (main_section(report))
+                (trainings_section(report))
                 (curves_section(report))
                 (fronts_section(report))
-                @match &report.detail {
-                    Some(detail) => {
-                        (trajectories_section(report, detail))
-                        (fading_section(detail))
-                        (engines_section(report))
-                        (generalization_section(report))
-                        (attention_section(detail))
-                    }
-                    None => { (engines_section(report)) (generalization_section(report)) }
-                }
+                (trajectories_section(report))
+                (fading_section(report))
+                (engines_section(report))
+                (generalization_section(report))
+                (attention_section(report))
                 (published_section())
             }
         }
@@ -59,9 +56,14 @@ fn head(report: &Report) -> Markup {
                 ". The numbers behind the page are in the CSV files beside it."
             }
             nav {
-                a href="#results" { "Results" } a href="#curves" { "Learning curves" } a href="#fronts" { "Pareto fronts" }
-                a href="#trajectories" { "Trajectories" } a href="#fading" { "Fading" } a href="#engines" { "Size and time" }
-                a href="#generalization" { "Generalization" } a href="#attention" { "Attention" }
+                a href="#results" { "Results" }
+                @if !report.trainings.is_empty() { a href="#seeds" { "Several seeds" } }
+                a href="#curves" { "Learning curves" } a href="#fronts" { "Pareto fronts" }
+                @if !report.details.is_empty() {
+                    a href="#trajectories" { "Trajectories" } a href="#fading" { "Fading" }
+                }
+                a href="#engines" { "Size and time" } a href="#generalization" { "Generalization" }
+                @if report.details.iter().any(Detail::has_attention) { a href="#attention" { "Attention" } }
                 a href="#published" { "The paper's numbers" }
             }
             (tiles(report))
@@ -77,7 +79,7 @@ fn tiles(report: &Report) -> Markup {
     let tile = |value: String, what: &str, paper: &str| {
         html! { li { span.value { (value) } span.what { (what) } span.paper { "paper: " (paper) } } }
     };
-    let fading = report.detail.as_ref().and_then(|detail| detail.fading.first());
+    let fading = report.details.first().and_then(|detail| detail.fading.first());
     html! {
         ul.tiles {
             @for (kind, name, paper) in [(ScenarioKind::ReachDestination, "RD", "about 87 %"), (ScenarioKind::ReturnBase, "RB", "about 85 %")] {
@@ -133,10 +135,10 @@ fn main_section(report: &Report) -> Markup {
 fn curves_section(report: &Report) -> Markup {
     section(
         "curves",
-        "Learning curves (figure 4 a, c)",
+        "Learning curves of the systems above",
         html! {
             @if report.curves.iter().all(|(_, points)| points.is_empty()) {
-                p { "No run was given: pass its folder with " code { "--run" } " or " code { "--curve" } "." }
+                p { "No run was given: pass its folder with " code { "--run" } "." }
             } @else {
                 figure {
                     (figure::curves_legend(report))
@@ -146,10 +148,9 @@ fn curves_section(report: &Report) -> Markup {
                         }
                     }
                     figcaption {
-                        b { "Figure 4 a, c. " } "Hypervolume of the mean front on 60 validation realizations of the trained "
-                        "setting during training. The best parameters are selected on these realizations; all other numbers "
-                        "of this page are from other realizations. The paper shows three seeds over environment steps and says that "
-                        "MOSAC-ATT leads after approximately 150\u{2009}000. From " code { "curves.csv" } "."
+                        "Hypervolume of the mean front on 60 validation realizations of the trained setting during training. The "
+                        "best parameters are selected on these realizations; all other numbers of this page are from other "
+                        "realizations. From " code { "curves.csv" } "."
                     }
                 }
             }
@@ -179,7 +180,10 @@ fn fronts_section(report: &Report) -> Markup {
     )
 }
 
-fn trajectories_section(report: &Report, detail: &Detail) -> Markup {
+fn trajectories_section(report: &Report) -> Markup {
+    if report.details.is_empty() {
+        return html! {};
+    }
     let printed = |kind: ScenarioKind, w_data: f32| {
         let found = EXAMPLES.iter().find(|example| example.0 == kind && example.1 == w_data);
         found.map(|&(_, _, percent, units)| format!("{percent} %, {units} units"))
@@ -188,18 +192,20 @@ fn trajectories_section(report: &Report, detail: &Detail) -> Markup {
         "trajectories",
         "Trajectories (figure 5)",
         html! {
-            @for (kind, tracks) in &detail.tracks {
-                @let name = Setting::trained(*kind).scenario_name();
-                figure {
-                    div.panels {
-                        @for track in tracks {
-                            div.panel {
-                                h3 { (name) ", w = (" (track.w_data) ", " (1.0 - track.w_data) ")" }
-                                (figure::mission(report, name, track))
-                                p {
-                                    (format!("{:.0} % of the data, {} units", track.data_percent, track.energy))
-                                    @if let Some(printed) = printed(*kind, track.w_data) {
-                                        br; span.quiet { "paper, its own example: " (printed) }
+            @for detail in &report.details {
+                @for (kind, tracks) in &detail.tracks {
+                    @let name = Setting::trained(*kind).scenario_name();
+                    figure {
+                        div.panels {
+                            @for track in tracks {
+                                div.panel {
+                                    h3 { (detail.system) ", " (name) ", w = (" (track.w_data) ", " (1.0 - track.w_data) ")" }
+                                    (figure::mission(report, name, track))
+                                    p {
+                                        (format!("{:.0} % of the data, {} units", track.data_percent, track.energy))
+                                        @if let Some(printed) = printed(*kind, track.w_data) {
+                                            br; span.quiet { "paper, its own example: " (printed) }
+                                        }
                                     }
                                 }
                             }
@@ -208,21 +214,24 @@ fn trajectories_section(report: &Report, detail: &Detail) -> Markup {
                 }
             }
             figure { figcaption {
-                b { "Figure 5. " } (detail.system) " on evaluation realization " (detail.example) " for three "
-                "preferences, north up. Darker roofs are higher. S start, T terminal, B base. Circles with a filled slice: "
-                "devices, and the share of their data that was collected. Blue discs: hovering, larger for longer. From "
-                code { "trajectories.csv" } "."
+                b { "Figure 5. " } "Evaluation realization " (report.example) " for three preferences, north up. Darker roofs "
+                "are higher. S start, T terminal, B base. Circles with a filled slice: devices, and the share of their data "
+                "that was collected. Blue discs: hovering, larger for longer. From " code { "trajectories.csv" } "."
             } }
         },
     )
 }
 
-fn fading_section(detail: &Detail) -> Markup {
-    let rows = detail.fading.iter().map(|(kind, regular, faded)| {
-        let name = Setting::trained(*kind).scenario_name();
-        (name, regular.mean_and_std(), faded.mean_and_std(), regular.0.len())
+fn fading_section(report: &Report) -> Markup {
+    if report.details.is_empty() {
+        return html! {};
+    }
+    let all = || report.details.iter().flat_map(|detail| detail.fading.iter().map(move |row| (detail, row)));
+    let rows = all().map(|(detail, (kind, regular, faded))| {
+        let name = format!("{}, {}", detail.system, Setting::trained(*kind).scenario_name());
+        (name, regular.mean_and_std(), faded.mean_and_std())
     });
-    let repeats = detail.fading.first().map_or(0, |(_, regular, _)| regular.0.len());
+    let repeats = all().next().map_or(0, |(_, (_, regular, _))| regular.0.len());
     section(
         "fading",
         "Robustness to fading (table I)",
@@ -237,9 +246,9 @@ fn fading_section(detail: &Detail) -> Markup {
                     tr.reference {
                         th scope="row" { "paper, MOSAC-ATT" } td { "87.49 ± 0.16" } td { "87.23 ± 0.28" } td { "0.26" }
                     }
-                    @for (name, regular, faded, _) in rows {
+                    @for (name, regular, faded) in rows {
                         tr {
-                            th scope="row" { (detail.system) ", " (name) }
+                            th scope="row" { (name) }
                             td { (format!("{:.2} ± {:.2}", regular.0, regular.1)) }
                             td { (format!("{:.2} ± {:.2}", faded.0, faded.1)) }
                             td { (super::chart::grouped(&format!("{:.2}", regular.0 - faded.0))) }

@@ -237,7 +237,7 @@ fn metric_row(report: &Report, metric: Metric, setting: Setting) -> Markup {
     }
 }
 
-fn published_cell(metric: Metric, setting: Setting) -> Markup {
+pub(super) fn published_cell(metric: Metric, setting: Setting) -> Markup {
     match metric.published(setting) {
         Some(text) => html! { td { (text) } },
         None => html! { td.missing { "not printed" } },

@@ -49,6 +49,24 @@ fn snapshots_load_and_fly() {
 }
 
 #[test]
+fn systems_with_attention_show_it() {
+    let world = Arc::new(World::default_world());
+    let seed = Seed::evaluation(0);
+    let realization = Realization::draw(world.city(), &Scenario::reach_destination(), seed).unwrap();
+    let flight = Flight::new(&world, &realization, seed, Preference::DATA).unwrap();
+    for system in System::ALL {
+        let snapshot = snapshot(system);
+        let attention = system.policy(&snapshot).attention(&flight).unwrap();
+        assert_eq!(attention.is_some(), system.has_attention(), "{system}");
+        let Some(attention) = attention else { continue };
+        // Aircraft, preference, map and six devices; six more may be present.
+        let sums: Vec<f32> = attention.0.iter().map(|row| row.iter().sum()).collect();
+        assert!(sums[..9].iter().all(|sum| (sum - 1.0).abs() < 1e-5), "{system}: {sums:?}");
+        assert!(sums[9..].iter().all(|&sum| sum == 0.0), "{system}: {sums:?}");
+    }
+}
+
+#[test]
 fn snapshot_without_a_system_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     checkpoint::save(&folder.path().join(SNAPSHOT), &snapshot(System::Gleaner)).unwrap();
