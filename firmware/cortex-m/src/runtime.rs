@@ -3,7 +3,7 @@
 use crate::{EventLog, PortStats};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use gleaner_link::{MAX_FRAME_BYTES, Severity};
-use gleaner_pilot::{Onboard, POLL_INTERVAL, State};
+use gleaner_pilot::{ChannelAware, Onboard, POLL_INTERVAL, State};
 use gleaner_policy::{Policy, Timed};
 use gleaner_units::{Duration, Instant};
 
@@ -48,7 +48,7 @@ impl LossReport {
 
 /// The pilot and its two ports.
 pub struct Runtime<'p, P, L, R> {
-    onboard: &'p mut Onboard<Timed<P>>,
+    onboard: &'p mut Onboard<ChannelAware<Timed<P>>>,
     link: L,
     radio: R,
     transmission: Transmission,
@@ -64,7 +64,7 @@ where
     R: Read + ReadReady,
 {
     /// `link` is connected to the autopilot, `radio` to the modem that sends reports. The pilot has not been polled.
-    pub fn new(onboard: &'p mut Onboard<Timed<P>>, link: L, radio: R) -> Runtime<'p, P, L, R> {
+    pub fn new(onboard: &'p mut Onboard<ChannelAware<Timed<P>>>, link: L, radio: R) -> Runtime<'p, P, L, R> {
         Runtime {
             onboard,
             link,
@@ -93,7 +93,7 @@ where
     }
 
     /// The pilot.
-    pub fn onboard(&mut self) -> &mut Onboard<Timed<P>> {
+    pub fn onboard(&mut self) -> &mut Onboard<ChannelAware<Timed<P>>> {
         self.onboard
     }
 
@@ -122,7 +122,7 @@ where
             // receiver, which discards it by its checksum.
             self.transmission.start = self.transmission.end;
         }
-        let took = self.onboard.policy().take();
+        let took = self.onboard.policy().network().take();
         if let Some(took) = took {
             self.onboard.set_inference_time(took);
         }

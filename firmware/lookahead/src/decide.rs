@@ -1,11 +1,13 @@
 //! The decision: the network proposes, the look-ahead improves, the guard's mask limits both.
 
+use crate::estimator::{CONTRADICTION, log10_of};
 use crate::fit::FitSettings;
 use crate::{
-    ChannelFit, ChannelModel, Effort, Links, Onboard, Problem, Rates, State, Stop, Tour, Transmission,
+    ChannelEstimator, ChannelFit, ChannelModel, Effort, Links, Onboard, Problem, Rates, State, Stop, Tour,
+    Transmission,
 };
 use gleaner_guard::Guard;
-use gleaner_policy::{DeviceState, Preference};
+use gleaner_policy::{ChannelOffset, DeviceState, Preference};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Sight};
 use rand_core::SeedableRng;
 use rand_xorshift::XorShiftRng;
@@ -21,14 +23,9 @@ const ONWARD: [f32; 2] = [0.5, 0.05];
 const FRESH_SHARE: u32 = 4;
 /// Utilities that differ by less are equal.
 const TIE: f32 = 1e-4;
-/// Information of the n-th report from one cell, compared to an independent one: `1 / (1 + n / REPORTS_PER_CELL)`.
-const REPORTS_PER_CELL: f32 = 4.0;
-/// Log-likelihood ratio at which the map's line of sight is overridden, and the most that one report contributes: it takes
-/// two reports from one cell.
+/// Log-likelihood ratio at which the map's line of sight is overridden. One report contributes at most [`CONTRADICTION`], so
+/// that it takes two reports from one cell.
 const OVERRIDE: f32 = 6.0;
-const EVIDENCE_MAX: f32 = 4.0;
-/// Information of a report that contradicts the map, compared to one that agrees with it.
-const DOUBTFUL: f32 = 0.25;
 
 /// The effort of one decision, in tours (see [`Effort::tours`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -100,18 +97,13 @@ pub struct Choice {
 /// About 5 kilobytes and 0.3 kilobytes a device.
 #[derive(Clone, Debug)]
 pub struct LookAhead<const D: usize> {
-    channel: ChannelModel,
-    settings: FitSettings,
-    fit: ChannelFit,
+    estimator: ChannelEstimator,
     links: Links<D>,
     rates: Rates,
     initial_units: f32,
     has_map: bool,
     tour: Option<Tour>,
     rng: XorShiftRng,
-    cell: Option<Cell>,
-    /// Slots in a row over the present cell.
-    stay: u32,
     /// By device: evidence that the map is wrong about the present cell.
     evidence: [f32; D],
     overrides: u32,
@@ -122,17 +114,13 @@ impl<const D: usize> LookAhead<D> {
     #[must_use]
     pub fn new(channel: ChannelModel, settings: FitSettings) -> LookAhead<D> {
         LookAhead {
-            channel,
-            settings,
-            fit: ChannelFit::new(&settings),
+            estimator: ChannelEstimator::new(channel, settings),
             links: Links::new(),
             rates: Rates::new(),
             initial_units: 0.0,
             has_map: false,
             tour: None,
             rng: XorShiftRng::seed_from_u64(0),
-            cell: None,
-            stay: 0,
             evidence: [0.0; D],
             overrides: 0,
         }
@@ -144,11 +132,9 @@ impl<const D: usize> LookAhead<D> {
     /// # Cost
     /// One ray for each pair of a device and a cell.
     pub fn begin(&mut self, sight: Option<&dyn Sight>, devices: &[DeviceState], seed: u64) {
-        self.fit = ChannelFit::new(&self.settings);
+        self.estimator.begin();
         self.rates.clear();
         self.tour = None;
-        self.cell = None;
-        self.stay = 0;
         self.evidence = [0.0; D];
         self.overrides = 0;
         self.rng = XorShiftRng::seed_from_u64(seed);
@@ -162,7 +148,13 @@ impl<const D: usize> LookAhead<D> {
     /// The channel fit.
     #[must_use]
     pub const fn fit(&self) -> &ChannelFit {
-        &self.fit
+        self.estimator.fit()
+    }
+
+    /// The channel for the network's tokens in the next slot: see [`ChannelFit::for_tokens`].
+    #[must_use]
+    pub fn for_tokens(&self) -> ChannelOffset {
+        self.estimator.for_tokens()
     }
 
     /// How often live SNR has overridden the map's line of sight.
@@ -195,11 +187,12 @@ impl<const D: usize> LookAhead<D> {
             let action = network.or_else(homeward).or_else(|| mask.iter().next())?;
             Some(Choice { action, source: Source::Network, expected: None, tours: 0 })
         };
-        if budget.tours == 0 || !self.has_map || !self.fit.is_trusted(&self.settings) {
+        if budget.tours == 0 || !self.has_map || !self.estimator.is_trusted() {
             self.tour = None;
             return fallback();
         }
-        self.rates.update(&self.channel, &self.fit, self.links.grid(), self.links.altitude());
+        let (channel, fit) = (self.estimator.channel(), self.estimator.fit());
+        self.rates.update(channel, fit, self.links.grid(), self.links.altitude());
         self.plan_ahead(view, network, mask, budget).or_else(fallback)
     }
 
@@ -269,12 +262,14 @@ impl<const D: usize> LookAhead<D> {
         let data = view.devices.iter().map(|device| device.remaining_units());
         let mut state = State::new(view.cell, view.battery, data);
         let heard = view.devices.iter().enumerate().filter_map(|(index, device)| {
-            let snr_db = device.snr_db().filter(|snr_db| *snr_db >= self.channel.threshold_db)?;
+            let snr_db = device.snr_db().filter(|snr_db| *snr_db >= self.estimator.channel().threshold_db)?;
             (device.remaining_units() > 0.0).then_some((index, snr_db))
         });
         let strongest = heard.reduce(|best, next| if next.1 > best.1 { next } else { best });
-        state.present = strongest
-            .map(|(device, snr_db)| Transmission { device, units: self.channel.units_per_slot(snr_db) });
+        state.present = strongest.map(|(device, snr_db)| Transmission {
+            device,
+            units: self.estimator.channel().units_per_slot(snr_db),
+        });
         state
     }
 
@@ -294,29 +289,19 @@ impl<const D: usize> LookAhead<D> {
 
     /// Updates channel fit and line of sight from live SNR.
     fn listen(&mut self, view: &View<'_>) {
-        if self.cell == Some(view.cell) {
-            self.stay = self.stay.saturating_add(1);
-        } else {
-            self.cell = Some(view.cell);
-            self.stay = 0;
+        if self.estimator.arrive(view.cell) {
             self.evidence = [0.0; D];
         }
         let Some(index) = self.links.grid().index(view.cell).filter(|_| self.has_map) else { return };
-        self.fit.advance(&self.settings);
-        let weight = 1.0 / (1.0 + self.stay as f32 / REPORTS_PER_CELL);
-        let cell_m2 = self.links.grid().cell().0 * self.links.grid().cell().0;
-        let height_m2 = self.links.altitude().0 * self.links.altitude().0;
+        self.estimator.advance();
+        let (cell_m, altitude_m) = (self.links.grid().cell().0, self.links.altitude().0);
         for (device, heard) in view.devices.iter().enumerate() {
             let Some(snr_db) = heard.snr_db() else { continue };
-            let (dx, dy) = (heard.cell.x.abs_diff(view.cell.x), heard.cell.y.abs_diff(view.cell.y));
-            let squared_cells = f32::from(dx) * f32::from(dx) + f32::from(dy) * f32::from(dy);
-            let log10_m = 0.5 * libm::log10f((squared_cells * cell_m2 + height_m2).max(1.0));
             let mapped = self.links.sees(device, index);
-            let [same, other] = [mapped, !mapped].map(|line_of_sight| {
-                self.fit.predict(&self.channel, line_of_sight, log10_m).log_likelihood(snr_db)
-            });
+            let link = (mapped, log10_of(cell_m, altitude_m, heard.cell, view.cell));
+            let doubt = self.estimator.doubt(link, snr_db);
             let Some(evidence) = self.evidence.get_mut(device) else { continue };
-            *evidence = (*evidence + (other - same).clamp(-EVIDENCE_MAX, EVIDENCE_MAX)).max(0.0);
+            *evidence = (*evidence + doubt.clamp(-CONTRADICTION, CONTRADICTION)).max(0.0);
             if *evidence >= OVERRIDE {
                 *evidence = 0.0;
                 self.overrides = self.overrides.saturating_add(1);
@@ -324,12 +309,8 @@ impl<const D: usize> LookAhead<D> {
                 for action in Action::MOVES {
                     self.links.correct(device, view.cell.after(action), !mapped);
                 }
-            } else if other - same < EVIDENCE_MAX {
-                self.fit.update(&self.settings, &self.channel, (mapped, log10_m), snr_db, weight);
             } else {
-                // The map is probably wrong here, but the report is not certain evidence of the other condition either.
-                let weight = weight * DOUBTFUL;
-                self.fit.update(&self.settings, &self.channel, (!mapped, log10_m), snr_db, weight);
+                self.estimator.take(link, snr_db, doubt);
             }
         }
     }

@@ -7,11 +7,16 @@
 //! nominal shadowing, for example under fading.
 
 use crate::ChannelModel;
+use gleaner_policy::ChannelOffset;
 use serde::{Deserialize, Serialize};
 
 const PARAMETERS: usize = 4;
 /// Distance at which the gains are estimated, decimal logarithm of metres: 100 m.
 const REFERENCE_LOG10_M: f32 = 2.0;
+/// The network's tokens keep the nominal channel until the estimated SNR is lower by this, dB, at 60 m or at 250 m: the network
+/// is trained with the nominal one, and the noise of the estimate must not disturb it.
+const TOKENS_KEEP_DB: f32 = 2.0;
+const TOKENS_LOG10_M: [f32; 2] = [1.778, 2.398];
 /// Mean of the square of a standard normal number, clipped at 1.
 const CLIPPED_NORMAL: f32 = 0.516;
 
@@ -169,6 +174,21 @@ impl ChannelFit {
         }
     }
 
+    /// The channel for the network's tokens: yield map and vantages count links with line of sight only. A channel near the
+    /// nominal one or stronger, or a fit that is not trusted, counts as nominal.
+    #[must_use]
+    pub fn for_tokens(&self, settings: &FitSettings) -> ChannelOffset {
+        let [_, _, gain_db, exponent] = self.mean;
+        let is_weaker = TOKENS_LOG10_M
+            .iter()
+            .any(|&log10_m| dot(&regressors(true, log10_m), &self.mean) <= -TOKENS_KEEP_DB);
+        if is_weaker && self.is_trusted(settings) {
+            ChannelOffset { gain_db, exponent }
+        } else {
+            ChannelOffset::NONE
+        }
+    }
+
     /// Whether the model explains what is received.
     #[must_use]
     pub fn is_trusted(&self, settings: &FitSettings) -> bool {
@@ -296,6 +316,22 @@ mod tests {
             assert!(error_db(&many, offset_db, exponent) < 0.6, "{offset_db} {exponent} {many:?}");
             assert!(many.is_trusted(&SETTINGS) && many.excess_db() < 1.0, "{many:?}");
         }
+    }
+
+    #[test]
+    fn tokens_follow_a_weaker_channel_only() {
+        let tokens = |offset_db, exponent| fitted(offset_db, exponent, 300, |_| 0.0).for_tokens(&SETTINGS);
+        for nominal in [tokens(0.0, 0.0), tokens(-1.0, 0.0), tokens(6.0, 0.0), tokens(0.0, -0.2)] {
+            assert_eq!(nominal, ChannelOffset::NONE);
+        }
+        let weak = tokens(-6.0, 0.0);
+        assert!((weak.gain_db + 6.0).abs() < 0.6 && weak.exponent.abs() < 0.1, "{weak:?}");
+        let steep = tokens(0.0, 0.3);
+        // At 100 m: 10 x 0.3 x 2 = 6 dB less.
+        assert!((steep.gain_db + 6.0).abs() < 0.6 && (steep.exponent - 0.3).abs() < 0.1, "{steep:?}");
+        let chaos = fitted(-6.0, 0.0, 300, |u| 80.0 * (u - 0.5));
+        assert_eq!(chaos.for_tokens(&SETTINGS), ChannelOffset::NONE);
+        assert_eq!(ChannelFit::NOMINAL.for_tokens(&SETTINGS), ChannelOffset::NONE);
     }
 
     #[test]

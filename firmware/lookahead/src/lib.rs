@@ -34,6 +34,7 @@
 mod channel;
 mod decide;
 mod draw;
+mod estimator;
 mod fit;
 mod links;
 mod model;
@@ -44,6 +45,7 @@ mod what_if;
 
 pub use channel::{ChannelModel, PathLoss};
 pub use decide::{Budget, Choice, Expected, LookAhead, Source, View, W_DATA_MAX};
+pub use estimator::ChannelEstimator;
 pub use fit::{ChannelEstimate, ChannelFit, FitSettings};
 pub use links::Links;
 pub use model::{EMPTY_UNITS, Model, Onboard, Transmission};

@@ -155,7 +155,7 @@ pub struct Telemetry {
     /// Battery percent expected at touchdown if the mission went home now; negative when it does not suffice.
     pub land_pct: Option<f32>,
     /// Gain of links with line of sight at 100 m compared to the nominal channel, dB, as estimated in this mission; `None`
-    /// without look-ahead.
+    /// where it is not estimated.
     pub snr_off: Option<f32>,
 }
 

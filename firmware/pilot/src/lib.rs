@@ -62,7 +62,8 @@ mod states;
 mod vehicle;
 
 pub use decide::{
-    Decision, DecisionRecord, Deliberator, LookAheadRecord, LookingAhead, Place, RECORD_BYTES_MAX,
+    ChannelAware, Decision, DecisionRecord, Deliberator, LookAheadRecord, LookingAhead, Place,
+    RECORD_BYTES_MAX,
 };
 #[cfg(feature = "std")]
 pub use decide::{

@@ -5,7 +5,7 @@
 //! ```
 
 use gleaner_policy::native::{Aligned, Model, NativePolicy, Workspace};
-use gleaner_policy::{DeviceState, Policy, Preference, Situation, Tokens};
+use gleaner_policy::{ChannelOffset, DeviceState, Policy, Preference, Situation, Tokens};
 use gleaner_units::{Action, BatteryUnits, Cell, Db, Grid, HeightMap, Metres, Rays};
 
 /// The model as the native engine reads it, aligned for its numbers.
@@ -25,6 +25,7 @@ fn main() {
         terminal: Cell::new(30, 10),
         preference: Preference::DATA,
         sight: &Rays { heights: &heights, altitude_m: 60 },
+        channel: ChannelOffset::NONE,
     };
     let device = DeviceState { cell: Cell::new(14, 10), remaining: 6000.0, snr: Some(Db(9.0)) };
 

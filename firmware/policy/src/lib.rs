@@ -54,7 +54,7 @@ mod token_table;
 pub use engine::{Engine, EngineKind, EngineNameError};
 pub use golden::{GOLDEN_TOLERANCE, Golden, SelfTestError, self_test};
 pub use inference::{Attention, Inference, Policy};
-pub use situation::{DeviceState, Preference, Situation};
+pub use situation::{ChannelOffset, DeviceState, Preference, Situation};
 pub use timed::Timed;
 #[cfg(feature = "std")]
 pub use token_table::TokenTable;

@@ -59,6 +59,20 @@ impl DeviceState {
     }
 }
 
+/// Deviation of links with line of sight from the nominal channel. The default is the nominal channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ChannelOffset {
+    /// Change of the gain at 100 m, dB.
+    pub gain_db: f32,
+    /// Change of the path-loss exponent.
+    pub exponent: f32,
+}
+
+impl ChannelOffset {
+    /// The nominal channel.
+    pub const NONE: ChannelOffset = ChannelOffset { gain_db: 0.0, exponent: 0.0 };
+}
+
 /// Everything that a decision depends on, except the devices.
 #[derive(Clone, Copy)]
 pub struct Situation<'a> {
@@ -74,4 +88,6 @@ pub struct Situation<'a> {
     pub preference: Preference,
     /// Line of sight between ground and flight altitude.
     pub sight: &'a dyn Sight,
+    /// The channel behind yield map and vantages.
+    pub channel: ChannelOffset,
 }

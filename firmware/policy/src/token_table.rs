@@ -2,8 +2,8 @@
 
 use crate::outlook::Outlook;
 use crate::vantage::{self, is_fast, nearest, vantage};
-use crate::yields::{self, REACH, WINDOW};
-use crate::{DeviceState, LOCAL_MAP_CELLS, Situation, Slots, Tokens};
+use crate::yields::{self, REACH, Rates, WINDOW};
+use crate::{ChannelOffset, DeviceState, LOCAL_MAP_CELLS, Situation, Slots, Tokens};
 use gleaner_units::{Cell, Grid, Metres, Sight};
 use heapless::Vec as Few;
 
@@ -19,11 +19,11 @@ const FAST_ROWS: usize = 2 * vantage::REACH as usize + 1;
 /// then limits it to the remaining data and adds it up around the aircraft. Vantages are kept for each pair of device
 /// and aircraft cell.
 ///
-/// Use one table for one city: the buildings behind [`Situation::sight`] must not change. A different grid or altitude
-/// clears the table.
+/// Use one table for one city: the buildings behind [`Situation::sight`] must not change. A different grid, altitude or
+/// channel clears the table.
 #[derive(Clone, Debug, Default)]
 pub struct TokenTable {
-    key: Option<(Grid, Metres)>,
+    key: Option<(Grid, Metres, ChannelOffset)>,
     /// By grid index of the device.
     devices: Vec<Option<Box<Coverage>>>,
 }
@@ -44,7 +44,7 @@ struct Coverage {
 impl Coverage {
     /// # Cost
     /// One line-of-sight test for each cell in range.
-    fn new(sight: &dyn Sight, device: Cell) -> Coverage {
+    fn new(rates: &Rates, sight: &dyn Sight, device: Cell) -> Coverage {
         let grid = sight.grid();
         let stride = usize::from(grid.width()) + COLUMNS;
         let margin = REACH as usize;
@@ -52,7 +52,7 @@ impl Coverage {
         for cell in grid.cells() {
             let place = (cell.y as usize + margin) * stride + cell.x as usize + margin;
             if let (Some(units), Some(place)) =
-                (yields::stay_units(sight, device, cell), stay_units.get_mut(place))
+                (yields::stay_units(rates, sight, device, cell), stay_units.get_mut(place))
             {
                 *place = units as u16;
             }
@@ -62,7 +62,7 @@ impl Coverage {
             for (bit, east) in (0..FAST_ROWS).zip(-vantage::REACH..) {
                 let cell = Cell::new(device.x.saturating_add(east), device.y.saturating_add(north));
                 let cells2 = i32::from(east) * i32::from(east) + i32::from(north) * i32::from(north);
-                *row |= u16::from(is_fast(sight, device, cell, cells2)) << bit;
+                *row |= u16::from(is_fast(rates, sight, device, cell, cells2)) << bit;
             }
         }
         Coverage { stay_units, stride, vantages: vec![None; grid.len()], fast }
@@ -105,7 +105,7 @@ impl TokenTable {
         situation: &Situation<'_>,
         devices: impl IntoIterator<Item = DeviceState>,
     ) -> (Tokens, Slots) {
-        let key = (situation.sight.grid(), situation.sight.altitude());
+        let key = (situation.sight.grid(), situation.sight.altitude(), situation.channel);
         let Some(aircraft) = key.0.index(situation.cell) else { return Tokens::build(situation, devices) };
         if self.key != Some(key) {
             self.key = Some(key);
@@ -113,6 +113,7 @@ impl TokenTable {
         }
         let mut outlook = Tabled {
             table: self,
+            rates: Rates::of(situation.channel),
             grid: key.0,
             sight: situation.sight,
             center: situation.cell,
@@ -125,6 +126,7 @@ impl TokenTable {
 
 struct Tabled<'a> {
     table: &'a mut TokenTable,
+    rates: Rates,
     grid: Grid,
     sight: &'a dyn Sight,
     center: Cell,
@@ -136,12 +138,13 @@ struct Tabled<'a> {
 /// `None` for a device outside the grid.
 fn coverage<'t>(
     table: &'t mut TokenTable,
+    rates: &Rates,
     grid: Grid,
     sight: &dyn Sight,
     device: Cell,
 ) -> Option<&'t mut Coverage> {
     let place = table.devices.get_mut(grid.index(device)?)?;
-    Some(place.get_or_insert_with(|| Box::new(Coverage::new(sight, device))))
+    Some(place.get_or_insert_with(|| Box::new(Coverage::new(rates, sight, device))))
 }
 
 impl Outlook for Tabled<'_> {
@@ -149,17 +152,17 @@ impl Outlook for Tabled<'_> {
         if device.remaining.is_nan() || device.remaining <= 0.0 {
             return;
         }
-        match coverage(self.table, self.grid, self.sight, device.cell) {
+        match coverage(self.table, &self.rates, self.grid, self.sight, device.cell) {
             // The cast saturates at more than any stay collects.
             Some(coverage) => coverage.add(&mut self.window, self.center, device.remaining as u16),
-            None => yields::add(&mut self.window, self.sight, self.center, device),
+            None => yields::add(&mut self.window, &self.rates, self.sight, self.center, device),
         }
     }
 
     fn vantage(&mut self, device: Cell) -> [f32; 2] {
         let (sight, center, aircraft) = (self.sight, self.center, self.aircraft);
-        let Some(coverage) = coverage(self.table, self.grid, sight, device) else {
-            return vantage(sight, device, center);
+        let Some(coverage) = coverage(self.table, &self.rates, self.grid, sight, device) else {
+            return vantage(&self.rates, sight, device, center);
         };
         if let Some(&Some(known)) = coverage.vantages.get(aircraft) {
             return known;
@@ -203,10 +206,12 @@ mod tests {
                 (-1_i16..41, -1_i16..31, -10.0_f32..9000.0, prop::option::of(-40.0_f32..30.0)),
                 0..14,
             ),
+            gain_db in -9.0_f32..9.0,
         ) {
             let heights = city(seed);
             let sight = Rays { heights: &heights, altitude_m: 60 };
             let mut table = TokenTable::new();
+            let channel = ChannelOffset { gain_db, exponent: 0.02 * gain_db };
             for (step, (x, y)) in cells.into_iter().enumerate() {
                 let situation = Situation {
                     cell: Cell::new(x, y),
@@ -215,6 +220,7 @@ mod tests {
                     terminal: Cell::new(x + 1, y),
                     preference: Preference::new(0.25).unwrap(),
                     sight: &sight,
+                    channel: if step % 3 == 2 { channel } else { ChannelOffset::NONE },
                 };
                 let devices = || devices.iter().map(|&(x, y, remaining, snr)| DeviceState {
                     cell: Cell::new(x, y),

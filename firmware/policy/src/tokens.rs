@@ -37,7 +37,7 @@ impl Tokens {
         situation: &Situation<'_>,
         devices: impl IntoIterator<Item = DeviceState>,
     ) -> (Tokens, Slots) {
-        Tokens::assemble(situation, devices, &mut Direct::new(situation.sight, situation.cell))
+        Tokens::assemble(situation, devices, &mut Direct::of(situation))
     }
 
     pub(crate) fn assemble(
@@ -117,7 +117,7 @@ fn replace_weakest(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Preference;
+    use crate::{ChannelOffset, Preference};
     use gleaner_units::{BatteryUnits, Db, Grid, HeightMap, Metres, Rays};
     use proptest::prelude::*;
 
@@ -133,6 +133,7 @@ mod tests {
             terminal: Cell::new(30, 18),
             preference: Preference::new(0.25).unwrap(),
             sight,
+            channel: ChannelOffset::NONE,
         }
     }
 

@@ -4,7 +4,7 @@
 //! vantage is the nearest cell to the aircraft with line of sight to the device and a fast link. Its offset and its distance
 //! in moves are direct inputs for planning.
 
-use crate::yields::units_per_slot;
+use crate::yields::Rates;
 use gleaner_units::{Cell, Sight};
 
 /// Lowest data rate of a vantage, data units per slot.
@@ -19,17 +19,17 @@ pub(crate) const REACH: i16 = 7;
 ///
 /// # Cost
 /// At most one line-of-sight test for each of the 149 cells around the device.
-pub(crate) fn vantage(sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
-    nearest(device, from, |cell, cells2| is_fast(sight, device, cell, cells2))
+pub(crate) fn vantage(rates: &Rates, sight: &dyn Sight, device: Cell, from: Cell) -> [f32; 2] {
+    nearest(device, from, |cell, cells2| is_fast(rates, sight, device, cell, cells2))
 }
 
 /// Whether `cell` has line of sight and a fast link to `device`, which is the root of `cells2` cells away.
 #[inline(always)]
-pub(crate) fn is_fast(sight: &dyn Sight, device: Cell, cell: Cell, cells2: i32) -> bool {
+pub(crate) fn is_fast(rates: &Rates, sight: &dyn Sight, device: Cell, cell: Cell, cells2: i32) -> bool {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;
     let height_m2 = sight.altitude().0 * sight.altitude().0;
-    units_per_slot(cells2 as f32 * cell_m2 + height_m2) >= FAST_UNITS
+    rates.units_per_slot(cells2 as f32 * cell_m2 + height_m2) >= FAST_UNITS
         && grid.contains(cell)
         && sight.sees(device, cell)
 }
@@ -64,6 +64,7 @@ pub(crate) fn nearest(device: Cell, from: Cell, is_fast: impl Fn(Cell, i32) -> b
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ChannelOffset;
     use gleaner_units::{Grid, HeightMap, Metres, Rays};
 
     fn flat() -> HeightMap {
@@ -72,7 +73,12 @@ mod tests {
 
     fn seen(heights: &HeightMap, device: (i16, i16), from: (i16, i16)) -> [f32; 2] {
         let rays = Rays { heights, altitude_m: 60 };
-        vantage(&rays, Cell::new(device.0, device.1), Cell::new(from.0, from.1))
+        vantage(
+            &Rates::of(ChannelOffset::NONE),
+            &rays,
+            Cell::new(device.0, device.1),
+            Cell::new(from.0, from.1),
+        )
     }
 
     #[test]
@@ -101,8 +107,9 @@ mod tests {
     fn device_without_a_vantage_is_its_own() {
         let heights = flat();
         let rays = |altitude_m| Rays { heights: &heights, altitude_m };
-        assert_eq!(vantage(&rays(200), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
+        let rates = Rates::of(ChannelOffset::NONE);
+        assert_eq!(vantage(&rates, &rays(200), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
         let beyond = Cell::new(i16::MAX, i16::MIN);
-        assert_eq!(vantage(&rays(60), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
+        assert_eq!(vantage(&rates, &rays(60), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
     }
 }

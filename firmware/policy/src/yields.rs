@@ -13,7 +13,7 @@
 //! number, and policies without the mark entered the terminal by mistake.
 
 use crate::schema::{TERMINAL_UNITS, YIELD_STEP_UNITS};
-use crate::{DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
+use crate::{ChannelOffset, DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
 use gleaner_units::{Cell, Sight};
 use heapless::Vec;
 
@@ -28,34 +28,83 @@ const BANDS: [(i16, i16); LOCAL_MAP_SIDE] =
 const SLOTS: f32 = 10.0;
 const STEPS_MAX: u16 = 255;
 
+const ENTRIES: usize = 64;
+/// The nominal channel: SNR at 1 m (dB), path-loss exponent, lowest SNR (dB), and data units for each bit per second per
+/// hertz (paper, eq. 6 and the table of simulation parameters; the paper leaves the noise level open, this is the simulated
+/// world's).
+const SNR_AT_1M_DB: f32 = 66.0;
+const EXPONENT: f32 = 2.5;
+const THRESHOLD_DB: f32 = 5.0;
+const SLOT_UNITS: f32 = 100.0;
+/// The first entry is computed at the lowest flight altitude, 20 m.
+const LOWEST_M2: f32 = 400.0;
+
 /// Data units per slot with line of sight, by the square of the 3-D distance in steps of [`TABLE_STEP_M2`]:
-/// `100 log2(1 + SNR)` with SNR = 66 dB - 25 log10(d), and 0 below 5 dB (paper, eq. 6 and the table of simulation
-/// parameters; the paper leaves the noise level open, this is the simulated world's). The first entry is computed at the
-/// lowest flight altitude, 20 m.
-const UNITS_PER_SLOT: [u16; 64] = [
+/// `100 log2(1 + SNR)`, and 0 below the threshold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rates([u16; ENTRIES]);
+
+const NOMINAL: Rates = Rates([
     1112, 914, 789, 717, 665, 626, 593, 566, 542, 522, 503, 486, 471, 457, 445, 433, 422, 412, 402, 393, 384,
     376, 368, 361, 354, 347, 341, 334, 329, 323, 317, 312, 307, 302, 298, 293, 289, 284, 280, 276, 272, 269,
     265, 261, 258, 255, 251, 248, 245, 242, 239, 236, 233, 230, 228, 225, 223, 220, 218, 215, 213, 211, 208,
     206,
-];
+]);
 const TABLE_STEP_M2: f32 = 1200.0;
-/// End of the table: devices farther away are out of range.
-const RANGE_M2: f32 = TABLE_STEP_M2 * (UNITS_PER_SLOT.len() - 1) as f32;
+/// End of the table: devices farther away are out of range, also on a stronger channel.
+const RANGE_M2: f32 = TABLE_STEP_M2 * (ENTRIES - 1) as f32;
 
-/// Data units per slot at this squared distance, linearly interpolated.
-pub(crate) fn units_per_slot(distance_m2: f32) -> f32 {
-    let place = distance_m2 / TABLE_STEP_M2;
-    let index = place as usize;
-    let (Some(&near), Some(&far)) = (UNITS_PER_SLOT.get(index), UNITS_PER_SLOT.get(index + 1)) else {
-        return 0.0;
-    };
-    let (near, far) = (f32::from(near), f32::from(far));
-    near + (far - near) * (place - index as f32)
+impl Rates {
+    /// The rates of a channel.
+    ///
+    /// # Cost
+    /// 64 exponentials and 128 logarithms, none for the nominal channel.
+    pub fn of(channel: ChannelOffset) -> Rates {
+        if channel == ChannelOffset::NONE {
+            return NOMINAL;
+        }
+        // The gain is that at 100 m.
+        let snr_at_1m_db = SNR_AT_1M_DB + channel.gain_db + 20.0 * channel.exponent;
+        let mut rates = NOMINAL;
+        for (index, units) in (0_u8..).zip(&mut rates.0) {
+            let distance_m2 = (f32::from(index) * TABLE_STEP_M2).max(LOWEST_M2);
+            let snr_db = snr_at_1m_db - 5.0 * (EXPONENT + channel.exponent) * libm::log10f(distance_m2);
+            *units = if snr_db >= THRESHOLD_DB {
+                let snr = exp2(snr_db * (0.1 * core::f32::consts::LOG2_10));
+                // The cast of half more rounds to the nearest.
+                (SLOT_UNITS * libm::log2f(1.0 + snr) + 0.5) as u16
+            } else {
+                0
+            };
+        }
+        rates
+    }
+
+    /// Data units per slot at this squared distance, linearly interpolated.
+    #[inline(always)]
+    pub fn units_per_slot(&self, distance_m2: f32) -> f32 {
+        let place = distance_m2 / TABLE_STEP_M2;
+        let index = place as usize;
+        let (Some(&near), Some(&far)) = (self.0.get(index), self.0.get(index + 1)) else {
+            return 0.0;
+        };
+        let (near, far) = (f32::from(near), f32::from(far));
+        near + (far - near) * (place - index as f32)
+    }
+}
+
+/// `2^x` for x in 0..31, with a relative error below 0.0002: far below a data unit. The functions of `libm` calculate in double
+/// precision, which the board has not, or are inlined where each instruction counts.
+fn exp2(x: f32) -> f32 {
+    let whole = x as u32;
+    let rest = x - whole as f32;
+    let power = 1.0 + rest * (0.695_976 + rest * (0.224_494 + rest * 0.079_020_4));
+    power * 1_u32.checked_shl(whole).unwrap_or(u32::MAX) as f32
 }
 
 /// What ten slots at `cell` collect from a device with unlimited data; `None` out of range or out of sight.
 #[cfg(feature = "std")]
-pub(crate) fn stay_units(sight: &dyn Sight, device: Cell, cell: Cell) -> Option<f32> {
+pub(crate) fn stay_units(rates: &Rates, sight: &dyn Sight, device: Cell, cell: Cell) -> Option<f32> {
     let grid = sight.grid();
     let cell_m2 = grid.cell().0 * grid.cell().0;
     let height_m2 = sight.altitude().0 * sight.altitude().0;
@@ -65,7 +114,7 @@ pub(crate) fn stay_units(sight: &dyn Sight, device: Cell, cell: Cell) -> Option<
     };
     let distance_m2 = square_m2(cell.y, device.y) + height_m2 + square_m2(cell.x, device.x);
     (distance_m2 < RANGE_M2 && grid.contains(cell) && sight.sees(device, cell))
-        .then(|| SLOTS * units_per_slot(distance_m2))
+        .then(|| SLOTS * rates.units_per_slot(distance_m2))
 }
 
 /// Adds what one device would send to each cell of the window around `center`: data units by north and east offset,
@@ -75,6 +124,7 @@ pub(crate) fn stay_units(sight: &dyn Sight, device: Cell, cell: Cell) -> Option<
 /// At most one line-of-sight test for each cell within range of both the aircraft and the device.
 pub(crate) fn add<const COLUMNS: usize>(
     window: &mut [[u16; COLUMNS]; WINDOW],
+    rates: &Rates,
     sight: &dyn Sight,
     center: Cell,
     device: &DeviceState,
@@ -102,7 +152,7 @@ pub(crate) fn add<const COLUMNS: usize>(
             }
             let cell = Cell::new(x.saturating_add(east), y.saturating_add(north));
             if grid.contains(cell) && sight.sees(device.cell, cell) {
-                let stay = SLOTS * units_per_slot(distance_m2);
+                let stay = SLOTS * rates.units_per_slot(distance_m2);
                 // At most ten times a table entry.
                 *units = units.saturating_add(stay.min(device.remaining) as u16);
             }
@@ -153,7 +203,7 @@ mod tests {
     fn map(heights: &HeightMap, devices: &[DeviceState]) -> std::vec::Vec<f32> {
         let rays = Rays { heights, altitude_m: 60 };
         let (mut window, center) = ([[0; WINDOW]; WINDOW], Cell::new(20, 15));
-        devices.iter().for_each(|device| add(&mut window, &rays, center, device));
+        devices.iter().for_each(|device| add(&mut window, &NOMINAL, &rays, center, device));
         patches(&window, center, Cell::new(0, 0)).to_vec()
     }
 
@@ -163,18 +213,42 @@ mod tests {
 
     #[test]
     fn table_matches_the_formula() {
-        for (index, &entry) in UNITS_PER_SLOT.iter().enumerate().take(63).skip(1) {
+        for (index, &entry) in NOMINAL.0.iter().enumerate().take(63).skip(1) {
             let distance_m2 = index as f32 * TABLE_STEP_M2;
             let snr_db = 66.0 - 12.5 * libm::log10f(distance_m2);
             assert!(snr_db >= 5.0, "entry {index}");
             let units = 100.0 * libm::log2f(1.0 + libm::exp10f(0.1 * snr_db));
             assert!((units - f32::from(entry)).abs() <= 0.6, "entry {index}: {units}");
-            assert_eq!(units_per_slot(distance_m2), f32::from(entry));
+            assert_eq!(NOMINAL.units_per_slot(distance_m2), f32::from(entry));
         }
         // The last entry ends the table.
-        assert!(units_per_slot(62.99 * TABLE_STEP_M2) > 205.0);
-        assert_eq!(units_per_slot(63.0 * TABLE_STEP_M2), 0.0);
-        assert_eq!(units_per_slot(600.0), 1013.0);
+        assert!(NOMINAL.units_per_slot(62.99 * TABLE_STEP_M2) > 205.0);
+        assert_eq!(NOMINAL.units_per_slot(63.0 * TABLE_STEP_M2), 0.0);
+        assert_eq!(NOMINAL.units_per_slot(600.0), 1013.0);
+    }
+
+    #[test]
+    fn powers_of_two_are_close() {
+        for step in 0..310 {
+            let x = 0.1 * step as f32;
+            assert!((exp2(x) / x.exp2() - 1.0).abs() < 2e-4, "2^{x}: {}", exp2(x));
+        }
+    }
+
+    #[test]
+    fn another_channel_has_other_rates() {
+        // Almost nominal: the formula reproduces the table.
+        let same = Rates::of(ChannelOffset { gain_db: 1e-4, exponent: 0.0 });
+        assert!(same.0.iter().zip(&NOMINAL.0).take(63).all(|(a, b)| a.abs_diff(*b) <= 1));
+        // 6 dB weaker: at 130 m the SNR is 7.2 dB, at 166 m it is below 5 dB.
+        let weak = Rates::of(ChannelOffset { gain_db: -6.0, exponent: 0.0 });
+        assert!((weak.units_per_slot(14.0 * TABLE_STEP_M2) - 264.0).abs() < 1.0);
+        assert_eq!(weak.units_per_slot(23.0 * TABLE_STEP_M2), 0.0);
+        // A larger exponent changes nothing at 100 m: 400 units per slot farther away become fewer, nearer more.
+        let steep = Rates::of(ChannelOffset { gain_db: 0.0, exponent: 0.3 });
+        assert!(steep.0[4] > NOMINAL.0[4] && steep.0[20] < NOMINAL.0[20]);
+        let broken = Rates::of(ChannelOffset { gain_db: f32::NAN, exponent: 0.0 });
+        assert_eq!(broken.0, [0; ENTRIES]);
     }
 
     #[test]
@@ -221,7 +295,7 @@ mod tests {
         assert_eq!(at(&map, 6, 4), 0.0, "behind the wall");
         let rays = Rays { heights: &heights, altitude_m: 60 };
         let (mut window, corner) = ([[0; WINDOW]; WINDOW], Cell::new(0, 0));
-        add(&mut window, &rays, corner, &device(0, 0, 8000.0));
+        add(&mut window, &NOMINAL, &rays, corner, &device(0, 0, 8000.0));
         let patches = patches(&window, corner, Cell::new(30, 18));
         assert!(patches[..4 * LOCAL_MAP_SIDE].iter().all(|&units| units == 0.0));
     }

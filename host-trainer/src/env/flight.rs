@@ -2,7 +2,7 @@
 
 use gleaner_guard::Guard;
 use gleaner_lookahead::View;
-use gleaner_policy::{DeviceState, Preference, Situation, TokenTable, Tokens};
+use gleaner_policy::{ChannelOffset, DeviceState, Preference, Situation, TokenTable, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, CellSet};
 use gleaner_world::{City, Episode, Realization, ScenarioError, Seed, Stream, World};
 use rand::RngExt;
@@ -167,6 +167,12 @@ impl Flight {
     /// The policy's observation of the current slot.
     #[must_use]
     pub fn tokens(&self) -> Tokens {
+        self.tokens_with(ChannelOffset::NONE)
+    }
+
+    /// As [`Flight::tokens`], with yield map and vantages of another than the nominal channel.
+    #[must_use]
+    pub fn tokens_with(&self, channel: ChannelOffset) -> Tokens {
         let situation = Situation {
             cell: self.episode.uav(),
             battery: self.episode.battery(),
@@ -174,14 +180,15 @@ impl Flight {
             terminal: self.episode.terminal(),
             preference: self.preference,
             sight: self.map(),
+            channel,
         };
         match &self.table {
-            Some(SharedTable(table)) => {
+            Some(SharedTable(table)) if channel == ChannelOffset::NONE => {
                 // A table is whole after each insertion, also when a thread has panicked in between.
                 let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
                 table.build(&situation, self.device_states()).0
             }
-            None => Tokens::build(&situation, self.device_states()).0,
+            _ => Tokens::build(&situation, self.device_states()).0,
         }
     }
 

@@ -121,7 +121,8 @@ impl Arena {
         P: Policy<Error: Display>,
     {
         let has_map = self.row.mismatch.map != MapError::Flat;
-        let network = self.fly(&mut Engine(&mut *policy))?;
+        // As it flies with look-ahead switched off: its tokens follow the estimated channel.
+        let network = self.fly(&mut LookingAhead::new(&mut *policy, Budget::NONE).with_map(has_map))?;
         let mut looking = LookingAhead::new(policy, budget).with_map(has_map);
         let lookahead = self.fly(&mut looking)?;
         let compared = Compared {

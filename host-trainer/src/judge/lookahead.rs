@@ -65,9 +65,6 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
     }
 
     fn decide_one(&mut self, number: usize, flight: &Flight) -> Result<Action, DeciderError> {
-        let begun = Instant::now();
-        let answer = self.policy.infer(&flight.tokens()).map_err(|error| DeciderError(error.to_string()))?;
-        self.times[0].push(begun.elapsed());
         let devices: Vec<DeviceState> = flight.device_states().collect();
         while self.flights.len() <= number {
             self.flights.push(LookAhead::new(ChannelModel::NOMINAL, self.settings));
@@ -77,6 +74,10 @@ impl<'a, P: Policy<Error: std::fmt::Display>> LookingAhead<'a, P> {
             let map = self.has_map.then(|| flight.map() as &dyn Sight);
             lookahead.begin(map, &devices, 0);
         }
+        let begun = Instant::now();
+        let tokens = flight.tokens_with(lookahead.for_tokens());
+        let answer = self.policy.infer(&tokens).map_err(|error| DeciderError(error.to_string()))?;
+        self.times[0].push(begun.elapsed());
         let begun = Instant::now();
         let choice = lookahead
             .propose(&flight.view(&devices), &answer.logits, flight.mask(), self.budget)

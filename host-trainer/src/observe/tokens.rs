@@ -132,7 +132,7 @@ impl Encoding for PolicyTokens {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_policy::{DeviceState, Situation, View};
+    use gleaner_policy::{ChannelOffset, DeviceState, Situation, View};
     use gleaner_units::{Action, BatteryUnits, Cell, Db};
     use gleaner_world::Mirror;
 
@@ -154,6 +154,7 @@ mod tests {
                     terminal: mirror.cell(grid, Cell::new(30, 18)),
                     preference: Preference::DATA,
                     sight: city,
+                    channel: ChannelOffset::NONE,
                 };
                 let devices = (0..6_u8).map(|index| DeviceState {
                     cell: mirror.cell(grid, open[usize::from(index) * 101]),

@@ -41,6 +41,7 @@ impl Slot {
             terminal: mission.terminal,
             preference: Preference::new(self.record.w_data)?,
             sight: &sight,
+            channel: self.record.channel,
         };
         Some(Tokens::build(&situation, self.heard.iter().copied()))
     }

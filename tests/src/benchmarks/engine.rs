@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use gleaner_guard::Guard;
 use gleaner_policy::native::{AlignedBytes, Model, NativePolicy, SimdPolicy, WeightFormat, Workspace};
 use gleaner_policy::onnx::{TractPolicy, convert};
-use gleaner_policy::{DeviceState, Policy, Preference, Situation, TokenTable, Tokens};
+use gleaner_policy::{ChannelOffset, DeviceState, Policy, Preference, Situation, TokenTable, Tokens};
 use gleaner_units::{BatteryUnits, Cell, CellSet, Db};
 use gleaner_world::City;
 use rand::SeedableRng;
@@ -181,6 +181,7 @@ pub(super) fn observation(page: &mut String) -> Result<()> {
             terminal,
             preference: Preference::DATA,
             sight: &city,
+            channel: ChannelOffset::NONE,
         };
         let devices = |step: usize| {
             city.open_cells().iter().step_by(53).take(count).map(move |&cell| DeviceState {

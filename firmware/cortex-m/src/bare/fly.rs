@@ -6,7 +6,7 @@ use crate::{Board, Cause, Parts, ResetRecord, Runtime, Services};
 use core::fmt;
 use core::mem::MaybeUninit;
 use gleaner_link::Severity;
-use gleaner_pilot::{Onboard, Parameters, Settings, mission_image};
+use gleaner_pilot::{ChannelAware, Onboard, Parameters, Settings, mission_image};
 use gleaner_policy::native::{BlobError, Model, NativePolicy, Workspace};
 use gleaner_policy::{Inference, Policy, SelfTestError, Timed, Tokens, self_test};
 use heapless::Vec;
@@ -24,7 +24,7 @@ impl Policy for BoardEngine {
 }
 
 static WORKSPACE: ConstStaticCell<Workspace> = ConstStaticCell::new(Workspace::new());
-static ONBOARD: StaticCell<Onboard<Timed<BoardEngine>>> = StaticCell::new();
+static ONBOARD: StaticCell<Onboard<ChannelAware<Timed<BoardEngine>>>> = StaticCell::new();
 
 /// Boots the pilot and runs it forever.
 pub fn fly<B: Board>(parts: Parts<B>) -> ! {
@@ -47,7 +47,7 @@ pub fn fly<B: Board>(parts: Parts<B>) -> ! {
 
 /// The main loop. Not inlined, so that its stack frame is not added to those of the boot.
 #[inline(never)]
-fn run<B: Board>(onboard: &mut Onboard<Timed<BoardEngine>>, mut services: Services<B>) -> ! {
+fn run<B: Board>(onboard: &mut Onboard<ChannelAware<Timed<BoardEngine>>>, mut services: Services<B>) -> ! {
     let mut runtime = Runtime::new(onboard, serial::link(), serial::radio());
     B::start_watchdog();
     loop {
@@ -81,7 +81,9 @@ impl fmt::Display for BootFault {
 /// Builds the pilot and loads mission and model. The pilot is built in its final place, and each step has a stack
 /// frame that ends before the next one starts: the stack is smaller than a pilot.
 #[inline(never)]
-fn boot(parameters: &Parameters) -> (&'static mut Onboard<Timed<BoardEngine>>, Vec<BootFault, 2>) {
+fn boot(
+    parameters: &Parameters,
+) -> (&'static mut Onboard<ChannelAware<Timed<BoardEngine>>>, Vec<BootFault, 2>) {
     let mut faults = Vec::new();
     let (Some(workspace), Some(place)) = (WORKSPACE.try_take(), ONBOARD.try_uninit()) else {
         fault::end(Cause::Panic { line: line!() })
@@ -107,18 +109,18 @@ fn engine(workspace: &'static mut Workspace) -> Result<NativePolicy<'static>, Bo
 /// Builds a pilot without mission in `place`.
 #[inline(never)]
 fn ground(
-    place: &'static mut MaybeUninit<Onboard<Timed<BoardEngine>>>,
+    place: &'static mut MaybeUninit<Onboard<ChannelAware<Timed<BoardEngine>>>>,
     parameters: Parameters,
     engine: BoardEngine,
-) -> &'static mut Onboard<Timed<BoardEngine>> {
+) -> &'static mut Onboard<ChannelAware<Timed<BoardEngine>>> {
     let Ok(ids) = Settings::default().checked() else { fault::end(Cause::Panic { line: line!() }) };
-    place.write(Onboard::grounded(parameters, ids, Timed::new(engine, now)))
+    place.write(Onboard::grounded(parameters, ids, ChannelAware::new(Timed::new(engine, now))))
 }
 
 /// Loads the mission from flash. A pilot without mission communicates but does not engage.
 #[inline(never)]
 fn load(
-    onboard: &mut Onboard<Timed<BoardEngine>>,
+    onboard: &mut Onboard<ChannelAware<Timed<BoardEngine>>>,
     tested: Result<(), SelfTestError>,
 ) -> Result<(), BootFault> {
     let mission = mission_image::decode(images::mission()).map_err(BootFault::Mission)?;

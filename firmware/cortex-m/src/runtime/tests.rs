@@ -3,7 +3,7 @@
 use super::*;
 use core::convert::Infallible;
 use embedded_io::ErrorType;
-use gleaner_pilot::{Decision, Mission, Parameters, Settings};
+use gleaner_pilot::{ChannelAware, Decision, Mission, Parameters, Settings};
 use gleaner_policy::{Inference, SelfTestError, Tokens};
 use gleaner_units::{BatteryUnits, Cell, CellSet, Degrees, GeoPoint, Grid, GridPose, HeightMap, Metres};
 use std::boxed::Box;
@@ -99,7 +99,7 @@ fn runtime() -> (Runtime<'static, NoEngine, Line, Line>, Line, Line) {
         budget: BatteryUnits(80.0),
         devices: heapless::Vec::new(),
     };
-    let engine = Timed::new(NoEngine, || Instant::ZERO);
+    let engine = ChannelAware::new(Timed::new(NoEngine, || Instant::ZERO));
     let failed = Err(SelfTestError::NoGolden);
     let onboard = Onboard::new(mission, Parameters::default(), Settings::default(), engine, failed).unwrap();
     let (link, radio) = (Line::default(), Line::default());

@@ -5,7 +5,7 @@ use crate::exchange::{collected, device_states};
 use crate::scene::Scene;
 use crate::{Outputs, ReturnReason, State};
 use gleaner_link::Severity;
-use gleaner_policy::{DeviceState, Situation, Tokens};
+use gleaner_policy::{ChannelOffset, DeviceState, Situation, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Rays, Sight};
 
 /// Where a decision is made.
@@ -64,12 +64,14 @@ impl Decider {
         out: &mut Outputs,
     ) -> Result<Action, ReturnReason> {
         let mask = scene.guard.mask(at.cell, at.battery);
-        let begins = core::mem::take(&mut self.begins);
-        let decision = self.draft(scene, at, Action::Hover, mask);
+        if core::mem::take(&mut self.begins) {
+            begin(policy, scene);
+        }
+        let decision = self.draft(scene, at, (Action::Hover, mask), policy.channel_for_tokens());
         match infer(policy, decision) {
             Ok(()) => {
+                propose(policy, scene, decision);
                 if D::LOOKS_AHEAD {
-                    look_ahead(policy, scene, decision, begins);
                     let is_alone = decision.lookahead.is_none_or(|record| record.tours == 0);
                     let fell_back = is_alone && scene.inputs.parameters.looks_ahead();
                     if fell_back && !self.fell_back {
@@ -98,7 +100,7 @@ impl Decider {
         out: &mut Outputs,
     ) -> Option<Action> {
         let action = scene.guard.homeward(at.cell)?;
-        self.draft(scene, at, action, ActionMask::EMPTY.with(action));
+        self.draft(scene, at, (action, ActionMask::EMPTY.with(action)), ChannelOffset::NONE);
         self.publish(out);
         Some(action)
     }
@@ -112,13 +114,12 @@ impl Decider {
         &mut self,
         scene: &Scene<'_>,
         at: Standpoint,
-        action: Action,
-        mask: ActionMask,
+        (action, mask): (Action, ActionMask),
+        channel: ChannelOffset,
     ) -> &mut Decision {
         let mission = scene.mission;
         let spare = scene.guard.spare(at.cell, at.battery).unwrap_or_default();
-        let altitude_m = scene.inputs.parameters.altitude().0 as u16;
-        let sight = Rays { heights: &mission.heights, altitude_m };
+        let sight = rays(scene);
         let situation = Situation {
             cell: at.cell,
             battery: at.battery,
@@ -126,6 +127,7 @@ impl Decider {
             terminal: mission.terminal,
             preference: scene.preference(),
             sight: &sight,
+            channel,
         };
         let (tokens, slots) = Tokens::build(&situation, device_states(mission, scene.inputs.devices));
         self.last.insert(Decision {
@@ -144,26 +146,35 @@ impl Decider {
             attended: None,
             collected: collected(mission, scene.inputs.devices),
             lookahead: None,
+            channel,
         })
     }
 }
 
-/// Lets the look-ahead choose among the actions that the guard allows.
-fn look_ahead<D: Deliberator>(policy: &mut D, scene: &Scene<'_>, decision: &mut Decision, begins: bool) {
-    let mission = scene.mission;
-    if begins {
-        let altitude_m = scene.inputs.parameters.altitude().0 as u16;
-        let rays = Rays { heights: &mission.heights, altitude_m };
-        // A map without any building is no map: the model would take every link for unobstructed.
-        let has_map = mission.heights.tallest().0 > 0.0;
-        let sites = mission.devices.iter();
-        let full = sites.map(|site| DeviceState { cell: site.cell, remaining: site.data, snr: None });
-        policy.begin(has_map.then_some(&rays as &dyn Sight), full, mission.seed());
-    }
+/// Line of sight over the mission's buildings.
+fn rays<'a>(scene: &Scene<'a>) -> Rays<'a> {
+    let altitude_m = scene.inputs.parameters.altitude().0 as u16;
+    Rays { heights: &scene.mission.heights, altitude_m }
+}
+
+/// Line of sight where there is a map. A map without any building is none: the model would take every link for unobstructed.
+fn mapped<'a>(rays: &'a Rays<'_>) -> Option<&'a dyn Sight> {
+    (rays.heights.tallest().0 > 0.0).then_some(rays as &dyn Sight)
+}
+
+fn begin<D: Deliberator>(policy: &mut D, scene: &Scene<'_>) {
+    let sites = scene.mission.devices.iter();
+    let full = sites.map(|site| DeviceState { cell: site.cell, remaining: site.data, snr: None });
+    policy.begin(mapped(&rays(scene)), full, scene.mission.seed());
+}
+
+/// Tells what was heard, and lets the look-ahead choose among the actions that the guard allows.
+fn propose<D: Deliberator>(policy: &mut D, scene: &Scene<'_>, decision: &mut Decision) {
     let Some(inference) = &decision.inference else { return };
     let Decision { cell, battery, preference, mask, .. } = *decision;
-    let place = Place { cell, battery, preference, guard: scene.guard };
-    let devices = device_states(mission, scene.inputs.devices);
+    let rays = rays(scene);
+    let place = Place { cell, battery, preference, guard: scene.guard, sight: mapped(&rays) };
+    let devices = device_states(scene.mission, scene.inputs.devices);
     let is_on = scene.inputs.parameters.looks_ahead();
     let proposed = policy.propose(&place, devices, &inference.logits, mask, is_on);
     if let Some((action, record)) = proposed.filter(|(action, _)| mask.allows(*action)) {

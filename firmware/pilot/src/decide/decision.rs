@@ -2,7 +2,7 @@
 
 use super::LookAheadRecord;
 use crate::State;
-use gleaner_policy::{Inference, Preference, Slots, Tokens};
+use gleaner_policy::{ChannelOffset, Inference, Preference, Slots, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Instant};
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +42,8 @@ pub struct Decision {
     pub collected: f32,
     /// How the look-ahead came to the action; `None` in a program without look-ahead.
     pub lookahead: Option<LookAheadRecord>,
+    /// The channel behind yield map and vantages.
+    pub channel: ChannelOffset,
 }
 
 /// What a ground station gets of a [`Decision`]: postcard in `TUNNEL` type 40001.
@@ -73,6 +75,8 @@ pub struct DecisionRecord {
     pub collected: f32,
     /// How the look-ahead came to the action; `None` in a program without look-ahead.
     pub lookahead: Option<LookAheadRecord>,
+    /// The channel behind yield map and vantages.
+    pub channel: ChannelOffset,
 }
 
 impl Decision {
@@ -93,6 +97,7 @@ impl Decision {
             attended: self.attended,
             collected: self.collected,
             lookahead: self.lookahead,
+            channel: self.channel,
         }
     }
 }

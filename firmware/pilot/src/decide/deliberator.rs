@@ -2,9 +2,9 @@
 
 use gleaner_guard::Guard;
 use gleaner_lookahead::{
-    Budget, ChannelEstimate, ChannelModel, Expected, FitSettings, LookAhead, Source, View,
+    Budget, ChannelEstimate, ChannelEstimator, ChannelModel, Expected, FitSettings, LookAhead, Source, View,
 };
-use gleaner_policy::{DeviceState, Inference, Policy, Preference, Tokens};
+use gleaner_policy::{ChannelOffset, DeviceState, Inference, Policy, Preference, Tokens};
 use gleaner_units::{Action, ActionMask, BatteryUnits, Cell, Duration, Instant, Sight};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,8 @@ pub struct Place<'a> {
     pub preference: Preference,
     /// Fence, terminal and reserve.
     pub guard: &'a Guard,
+    /// Line of sight; `None` without a map of buildings.
+    pub sight: Option<&'a dyn Sight>,
 }
 
 /// How the look-ahead came to an action.
@@ -43,7 +45,8 @@ pub struct LookAheadRecord {
     pub channel: ChannelEstimate,
 }
 
-/// What the machine decides with. Each [`Policy`] is one that decides alone; [`LookingAhead`] plans as well.
+/// What the machine decides with. Each [`Policy`] is one that decides alone; [`ChannelAware`] estimates the channel for its
+/// tokens; [`LookingAhead`] does so and plans.
 ///
 /// The result must depend on the arguments and on earlier calls only, so that a decision log can be replayed.
 pub trait Deliberator {
@@ -57,7 +60,7 @@ pub trait Deliberator {
     fn begin(&mut self, sight: Option<&dyn Sight>, devices: impl Iterator<Item = DeviceState>, seed: u32);
 
     /// The action for this slot, inside `mask`; `None` leaves it to the network. To be called once a slot, also while
-    /// look-ahead is switched off (`is_on`), because the channel is estimated all the time.
+    /// look-ahead is switched off (`is_on`), because the channel is estimated from every slot.
     fn propose(
         &mut self,
         place: &Place<'_>,
@@ -67,7 +70,10 @@ pub trait Deliberator {
         is_on: bool,
     ) -> Option<(Action, LookAheadRecord)>;
 
-    /// The channel as estimated in this mission; `None` before the first decision and without look-ahead.
+    /// The channel for yield map and vantages of the next slot.
+    fn channel_for_tokens(&self) -> ChannelOffset;
+
+    /// The channel as estimated in this mission; `None` before the first decision and where it is not estimated.
     fn channel(&self) -> Option<ChannelEstimate>;
 }
 
@@ -91,8 +97,72 @@ impl<P: Policy> Deliberator for P {
         None
     }
 
+    fn channel_for_tokens(&self) -> ChannelOffset {
+        ChannelOffset::NONE
+    }
+
     fn channel(&self) -> Option<ChannelEstimate> {
         None
+    }
+}
+
+/// A network alone, with yield map and vantages of the channel as estimated in flight: 150 bytes beside the network.
+#[derive(Clone, Debug)]
+pub struct ChannelAware<P> {
+    policy: P,
+    estimator: ChannelEstimator,
+    /// Whether a slot of this mission was heard.
+    has_listened: bool,
+}
+
+impl<P> ChannelAware<P> {
+    /// The nominal channel is the prior.
+    #[must_use]
+    pub const fn new(policy: P) -> ChannelAware<P> {
+        let estimator = ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
+        ChannelAware { policy, estimator, has_listened: false }
+    }
+
+    /// The network.
+    #[must_use]
+    pub const fn network(&self) -> &P {
+        &self.policy
+    }
+}
+
+impl<P: Policy> Deliberator for ChannelAware<P> {
+    const LOOKS_AHEAD: bool = false;
+
+    fn infer(&mut self, tokens: &Tokens) -> Option<Inference> {
+        self.policy.infer(tokens).ok()
+    }
+
+    fn begin(&mut self, _: Option<&dyn Sight>, _: impl Iterator<Item = DeviceState>, _: u32) {
+        self.estimator.begin();
+        self.has_listened = false;
+    }
+
+    fn propose(
+        &mut self,
+        place: &Place<'_>,
+        devices: impl Iterator<Item = DeviceState>,
+        _: &[f32; Action::COUNT],
+        _: ActionMask,
+        _: bool,
+    ) -> Option<(Action, LookAheadRecord)> {
+        if let Some(sight) = place.sight {
+            self.estimator.listen(sight, place.cell, devices);
+            self.has_listened = true;
+        }
+        None
+    }
+
+    fn channel_for_tokens(&self) -> ChannelOffset {
+        self.estimator.for_tokens()
+    }
+
+    fn channel(&self) -> Option<ChannelEstimate> {
+        self.has_listened.then(|| self.estimator.fit().estimate())
     }
 }
 
@@ -179,7 +249,7 @@ impl<P: Policy> Deliberator for LookingAhead<P> {
         is_on: bool,
     ) -> Option<(Action, LookAheadRecord)> {
         self.devices = devices.take(MAX_DEVICES).collect();
-        let &Place { cell, battery, preference, guard } = place;
+        let &Place { cell, battery, preference, guard, .. } = place;
         let view = View { cell, battery, preference, guard, devices: &self.devices };
         let budget = if is_on { self.budget } else { Budget::NONE };
         let begun = self.now();
@@ -201,6 +271,10 @@ impl<P: Policy> Deliberator for LookingAhead<P> {
             channel: self.lookahead.fit().estimate(),
         };
         Some((choice.action, record))
+    }
+
+    fn channel_for_tokens(&self) -> ChannelOffset {
+        self.lookahead.for_tokens()
     }
 
     fn channel(&self) -> Option<ChannelEstimate> {

@@ -12,7 +12,7 @@ mod replay;
 
 pub(crate) use decider::{Decider, Standpoint};
 pub use decision::{Decision, DecisionRecord, RECORD_BYTES_MAX};
-pub use deliberator::{Deliberator, LookAheadRecord, LookingAhead, Place};
+pub use deliberator::{ChannelAware, Deliberator, LookAheadRecord, LookingAhead, Place};
 #[cfg(feature = "std")]
 pub use logged::{LoggedDecision, SimulatedSlot};
 #[cfg(feature = "std")]

@@ -96,6 +96,8 @@ impl UnderWay {
             battery: BatteryUnits(logged.battery),
             preference: Preference::new(logged.w_data)?,
             guard: &self.guard,
+            // The planner has kept line of sight since the mission began.
+            sight: None,
         };
         let devices = self.mission.sites().zip(&entry.devices).map(|(site, device)| DeviceState {
             remaining: device.remaining,

@@ -3,7 +3,8 @@
 use crate::bench::Bench;
 use crate::rig::{Rig, Scripted, mission};
 use gleaner_lookahead::ChannelModel;
-use gleaner_pilot::{Budget, LookAheadRecord, LookingAhead, Mission, Source, State};
+use gleaner_pilot::{Budget, ChannelAware, Decision, LookAheadRecord, LookingAhead, Mission, Source, State};
+use gleaner_policy::ChannelOffset;
 use gleaner_units::{Action, Cell, Db};
 
 const BUDGET: Budget = Budget { tours: 80 };
@@ -135,6 +136,44 @@ fn the_channel_offset_is_in_record_and_telemetry() {
     let mut alone = Rig::engaged();
     alone.run(5.0);
     assert_eq!(alone.telemetry.unwrap().snr_off, None);
+}
+
+/// The decision after ten slots of hovering on a channel that is off by this much.
+fn hovered(mut rig: Rig, offset_db: f32) -> Decision {
+    for _ in 0..10 {
+        while !rig.step().decided {}
+        let cell = rig.machine.decision().unwrap().cell;
+        report(&mut rig, cell, offset_db, 100.0);
+    }
+    rig.machine.decision().unwrap().clone()
+}
+
+#[test]
+fn network_alone_sees_the_yields_of_a_weaker_channel() {
+    let with_lookahead_off = || {
+        let mut rig = engaged(built());
+        rig.set("GLN_LOOKAHEAD", 0.0);
+        rig
+    };
+    let on_a_board = || {
+        let mut rig = Rig::with(built(), true);
+        let network = Scripted { actions: Default::default(), ..rig.policy.clone() };
+        rig.aware = Some(ChannelAware::new(network));
+        rig.engage();
+        rig
+    };
+    for rig in [&with_lookahead_off as &dyn Fn() -> Rig, &on_a_board] {
+        let (nominal, stronger, weaker) = (hovered(rig(), 0.0), hovered(rig(), 6.0), hovered(rig(), -6.0));
+        assert_eq!((nominal.channel, stronger.channel), (ChannelOffset::NONE, ChannelOffset::NONE));
+        assert_eq!(stronger.tokens.local_map, nominal.tokens.local_map);
+        assert!((-8.0..-4.0).contains(&weaker.channel.gain_db), "{:?}", weaker.channel);
+        assert_eq!(weaker.record().channel, weaker.channel);
+        let sum = |decision: &Decision| decision.tokens.local_map.iter().sum::<f32>();
+        assert!(sum(&weaker) < 0.95 * sum(&nominal), "{} of {}", sum(&weaker), sum(&nominal));
+    }
+    let mut board = on_a_board();
+    board.run(30.0);
+    assert!(board.telemetry.unwrap().snr_off.is_some());
 }
 
 #[test]

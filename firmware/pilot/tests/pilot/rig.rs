@@ -3,8 +3,8 @@
 use gleaner_guard::Guard;
 use gleaner_link::{AutopilotCommand, Firmware, FlightMode, Parameters, Velocity};
 use gleaner_pilot::{
-    DeviceSite, Devices, Inputs, LookingAhead, Machine, Mission, Outputs, RadioActivity, Request, Rules,
-    State, Telemetry, Vehicle,
+    ChannelAware, DeviceSite, Devices, Inputs, LookingAhead, Machine, Mission, Outputs, RadioActivity,
+    Request, Rules, State, Telemetry, Vehicle,
 };
 use gleaner_policy::{Attention, DeviceState, Inference, Policy, Tokens};
 use gleaner_units::{
@@ -89,6 +89,8 @@ pub struct Rig {
     pub policy: Scripted,
     /// Decides in place of `policy`, if it is there.
     pub ahead: Option<LookingAhead<Scripted>>,
+    /// As `ahead`: what a board decides with.
+    pub aware: Option<ChannelAware<Scripted>>,
     pub now: Instant,
     pub request: Option<Request>,
     pub other_mode_seen: bool,
@@ -154,6 +156,7 @@ impl Rig {
                 asked: Vec::new(),
             },
             ahead: None,
+            aware: None,
             now: Instant::from_millis(10_000),
             request: None,
             other_mode_seen: false,
@@ -231,9 +234,10 @@ impl Rig {
             ended: &ended,
             engage_inhibited: self.engage_inhibited,
         };
-        let out = match &mut self.ahead {
-            Some(ahead) => self.machine.poll(self.now, &inputs, ahead),
-            None => self.machine.poll(self.now, &inputs, &mut self.policy),
+        let out = match (&mut self.ahead, &mut self.aware) {
+            (Some(ahead), _) => self.machine.poll(self.now, &inputs, ahead),
+            (None, Some(aware)) => self.machine.poll(self.now, &inputs, aware),
+            (None, None) => self.machine.poll(self.now, &inputs, &mut self.policy),
         };
         let at_ms = self.now.as_millis();
         self.telemetry = out.telemetry.filter(|told| told.land_pct.is_some()).or(self.telemetry);

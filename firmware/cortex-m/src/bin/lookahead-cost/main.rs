@@ -15,7 +15,7 @@ use gleaner_cortex_m::bare::end;
 use gleaner_guard::Guard;
 use gleaner_link::{Component, Parameters, PositionTarget, Settings};
 use gleaner_lookahead::{Budget, ChannelModel, FitSettings, LookAhead, View};
-use gleaner_policy::{DeviceState, Preference, Situation, Tokens};
+use gleaner_policy::{ChannelOffset, DeviceState, Preference, Situation, Tokens};
 use gleaner_units::{
     Action, ActionMask, BatteryUnits, Cell, CellSet, Db, Duration, Grid, HeightMap, Instant, Metres, Ned,
     Rays, Sight,
@@ -108,6 +108,7 @@ fn measure() -> Option<()> {
             terminal: Cell::new(36, 20),
             preference: view.preference,
             sight: &rays,
+            channel: ChannelOffset::NONE,
         };
         print(
             "tokens",
