@@ -1,10 +1,12 @@
 //! The numbers of the page as CSV files.
 
 use super::Report;
+use super::training::REPORTED;
 use crate::judge::evaluation::{Missions, test_preferences};
 use crate::judge::explanation::KINDS;
 use crate::judge::paper::{CITATIONS, Setting};
 use crate::judge::pareto::front;
+use gleaner_world::ScenarioKind;
 
 /// Name of the oracle in tables, legends and files.
 pub(super) const ORACLE: &str = "ORACLE";
@@ -203,8 +205,18 @@ fn curves(report: &Report) -> String {
 }
 
 fn trainings(report: &Report) -> String {
-    let (head, lines) = super::training::trainings_csv(report);
-    file(head, lines.into_iter().map(|fields| fields.map(|text| field(&text)).join(",")))
+    let lines = report.trainings.iter().flat_map(|training| {
+        ScenarioKind::ALL.into_iter().flat_map(move |kind| {
+            REPORTED.into_iter().flat_map(move |name| {
+                training.along(kind, name).into_iter().map(move |point| {
+                    let (run, scenario) = (field(&training.name), Setting::trained(kind).scenario_name());
+                    let (mean, deviation) = (point.mean, point.deviation);
+                    format!("{run},{scenario},{},{name},{},{mean},{deviation}", point.steps, point.seeds)
+                })
+            })
+        })
+    });
+    file("training,scenario,steps,name,seeds,mean,standard_deviation", lines)
 }
 
 fn published() -> String {

@@ -9,6 +9,7 @@ mod drawing;
 mod figure;
 mod page;
 mod section;
+mod seeds;
 mod table;
 mod training;
 

@@ -2,8 +2,8 @@
 
 use super::attention::attention_section;
 use super::section::section;
+use super::seeds::trainings_section;
 use super::table::{Metric, main_table, metric_table};
-use super::training::trainings_section;
 use super::{Detail, Report, figure};
 use crate::judge::paper::{CITATIONS, EXAMPLES, Setting};
 use gleaner_world::ScenarioKind;
