@@ -52,18 +52,24 @@ impl fmt::Display for Interval {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
+/// The mean; 0 for none.
+pub(crate) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Standard error of the mean, from the sample variance.
 fn standard_error(values: &[f64]) -> f64 {
-    let (count, mean) = (values.len() as f64, mean(values));
+    (sample_variance(values) / values.len().max(1) as f64).sqrt()
+}
+
+/// The sample variance; 0 for fewer than two values.
+pub(crate) fn sample_variance(values: &[f64]) -> f64 {
     if values.len() < 2 {
         return 0.0;
     }
+    let mean = mean(values);
     let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-    (squares / (count - 1.0) / count).sqrt()
+    squares / (values.len() as f64 - 1.0)
 }
 
 #[cfg(test)]

@@ -194,7 +194,8 @@ fn engines(report: &Report) -> String {
 }
 
 fn curves(report: &Report) -> String {
-    let lines = report.curves.iter().flat_map(|(run, points)| {
+    let seeds = report.trainings.iter().flat_map(|training| &training.runs);
+    let lines = report.curves.iter().chain(seeds).flat_map(|(run, points)| {
         points.iter().flat_map(move |point| {
             let scalars = point.scalars.iter();
             scalars

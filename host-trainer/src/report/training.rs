@@ -1,5 +1,6 @@
 //! Trainings that were repeated with several seeds: mean and standard deviation over the runs.
 
+use crate::judge::interval::{mean, sample_variance};
 use crate::keep::curves::Point;
 use gleaner_world::ScenarioKind;
 use std::collections::BTreeMap;
@@ -51,10 +52,8 @@ impl Training {
 
 impl OverSeeds {
     fn of(steps: u64, values: &[f64]) -> OverSeeds {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        OverSeeds { steps, seeds: values.len(), mean, deviation: (squares / (count - 1.0).max(1.0)).sqrt() }
+        let deviation = sample_variance(values).sqrt();
+        OverSeeds { steps, seeds: values.len(), mean: mean(values), deviation }
     }
 }
 
