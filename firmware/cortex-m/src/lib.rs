@@ -55,6 +55,6 @@ pub use parameter_saver::{ParameterSaver, SaveNotice};
 pub use port::{Endpoint, LineFault, Port, PortStats, Uart};
 pub use reset_record::{Cause, ResetFlags, ResetRecord, ResetReport};
 pub use ring::Ring;
-pub use runtime::Runtime;
+pub use runtime::{Pilot, Runtime};
 pub use status_led::{Signal, StatusLed};
 pub use store::{ParameterStore, Restored, SaveError};

@@ -46,9 +46,12 @@ impl LossReport {
     }
 }
 
+/// The pilot of a board: it times its network and estimates the channel.
+pub type Pilot<P> = Onboard<ChannelAware<Timed<P>>>;
+
 /// The pilot and its two ports.
 pub struct Runtime<'p, P, L, R> {
-    onboard: &'p mut Onboard<ChannelAware<Timed<P>>>,
+    onboard: &'p mut Pilot<P>,
     link: L,
     radio: R,
     transmission: Transmission,
@@ -64,7 +67,7 @@ where
     R: Read + ReadReady,
 {
     /// `link` is connected to the autopilot, `radio` to the modem that sends reports. The pilot has not been polled.
-    pub fn new(onboard: &'p mut Onboard<ChannelAware<Timed<P>>>, link: L, radio: R) -> Runtime<'p, P, L, R> {
+    pub fn new(onboard: &'p mut Pilot<P>, link: L, radio: R) -> Runtime<'p, P, L, R> {
         Runtime {
             onboard,
             link,
@@ -93,7 +96,7 @@ where
     }
 
     /// The pilot.
-    pub fn onboard(&mut self) -> &mut Onboard<ChannelAware<Timed<P>>> {
+    pub fn onboard(&mut self) -> &mut Pilot<P> {
         self.onboard
     }
 

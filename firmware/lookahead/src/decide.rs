@@ -1,6 +1,6 @@
 //! The decision: the network proposes, the look-ahead improves, the guard's mask limits both.
 
-use crate::estimator::{CONTRADICTION, log10_of};
+use crate::estimator::{CONTRADICTION, log10_m};
 use crate::fit::FitSettings;
 use crate::{
     ChannelEstimator, ChannelFit, ChannelModel, Effort, Links, Onboard, Problem, Rates, State, Stop, Tour,
@@ -294,11 +294,11 @@ impl<const D: usize> LookAhead<D> {
         }
         let Some(index) = self.links.grid().index(view.cell).filter(|_| self.has_map) else { return };
         self.estimator.advance();
-        let (cell_m, altitude_m) = (self.links.grid().cell().0, self.links.altitude().0);
+        let (grid, altitude) = (self.links.grid(), self.links.altitude());
         for (device, heard) in view.devices.iter().enumerate() {
             let Some(snr_db) = heard.snr_db() else { continue };
             let mapped = self.links.sees(device, index);
-            let link = (mapped, log10_of(cell_m, altitude_m, heard.cell, view.cell));
+            let link = (mapped, log10_m(grid, altitude, heard.cell, view.cell));
             let doubt = self.estimator.doubt(link, snr_db);
             let Some(evidence) = self.evidence.get_mut(device) else { continue };
             *evidence = (*evidence + doubt.clamp(-CONTRADICTION, CONTRADICTION)).max(0.0);

@@ -1,8 +1,8 @@
 //! The channel of a mission, from the reports of all devices.
 
-use crate::{ChannelFit, ChannelModel, FitSettings};
+use crate::{ChannelEstimate, ChannelFit, ChannelModel, FitSettings};
 use gleaner_policy::{ChannelOffset, DeviceState};
-use gleaner_units::{Cell, Sight};
+use gleaner_units::{Cell, Grid, Metres, Sight};
 
 /// Information of the n-th report from one cell, compared to an independent one: `1 / (1 + n / REPORTS_PER_CELL)`.
 const REPORTS_PER_CELL: f32 = 4.0;
@@ -11,7 +11,7 @@ pub(crate) const CONTRADICTION: f32 = 4.0;
 /// Information of a report that contradicts the map, compared to one that agrees with it.
 const DOUBTFUL: f32 = 0.25;
 
-/// Fits the channel to live SNR, slot by slot. It is all that a board without look-ahead needs: 150 bytes.
+/// Fits the channel to live SNR, slot by slot. It is all that a board without look-ahead needs.
 #[derive(Clone, Debug)]
 pub struct ChannelEstimator {
     channel: ChannelModel,
@@ -43,6 +43,12 @@ impl ChannelEstimator {
         &self.fit
     }
 
+    /// What the fit has found in this mission; `None` before the first slot.
+    #[must_use]
+    pub fn estimate(&self) -> Option<ChannelEstimate> {
+        self.cell.map(|_| self.fit.estimate())
+    }
+
     /// The prior.
     #[must_use]
     pub const fn channel(&self) -> &ChannelModel {
@@ -67,13 +73,14 @@ impl ChannelEstimator {
     /// One ray for each device with a report.
     pub fn listen(&mut self, sight: &dyn Sight, cell: Cell, devices: impl IntoIterator<Item = DeviceState>) {
         self.arrive(cell);
-        if !sight.grid().contains(cell) {
+        let (grid, altitude) = (sight.grid(), sight.altitude());
+        if !grid.contains(cell) {
             return;
         }
         self.advance();
         for device in devices {
             let Some(snr_db) = device.snr_db() else { continue };
-            let link = (sight.sees(device.cell, cell), log10_m(sight, device.cell, cell));
+            let link = (sight.sees(device.cell, cell), log10_m(grid, altitude, device.cell, cell));
             let doubt = self.doubt(link, snr_db);
             self.take(link, snr_db, doubt);
         }
@@ -113,22 +120,18 @@ impl ChannelEstimator {
     }
 }
 
-/// Decimal logarithm of the distance in space, metres.
-pub(crate) fn log10_m(sight: &dyn Sight, device: Cell, aircraft: Cell) -> f32 {
-    log10_of(sight.grid().cell().0, sight.altitude().0, device, aircraft)
-}
-
-/// As [`log10_m`], from the side of a cell and the altitude, m.
-pub(crate) fn log10_of(cell_m: f32, altitude_m: f32, device: Cell, aircraft: Cell) -> f32 {
+/// Decimal logarithm of the distance in space, metres, between a device and an aircraft at this altitude.
+pub(crate) fn log10_m(grid: Grid, altitude: Metres, device: Cell, aircraft: Cell) -> f32 {
+    let (cell_m2, height_m2) = (grid.cell().0 * grid.cell().0, altitude.0 * altitude.0);
     let (dx, dy) = (device.x.abs_diff(aircraft.x), device.y.abs_diff(aircraft.y));
     let squared_cells = f32::from(dx) * f32::from(dx) + f32::from(dy) * f32::from(dy);
-    0.5 * libm::log10f((squared_cells * (cell_m * cell_m) + altitude_m * altitude_m).max(1.0))
+    0.5 * libm::log10f((squared_cells * cell_m2 + height_m2).max(1.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gleaner_units::{Db, Grid, HeightMap, Metres, Rays};
+    use gleaner_units::{Db, HeightMap, Rays};
 
     #[test]
     fn reports_of_a_weak_channel_are_learned_within_one_way() {
@@ -139,7 +142,8 @@ mod tests {
         let site = Cell::new(14, 10);
         let report = |cell: Cell, offset_db: f32| {
             let line_of_sight = sight.sees(site, cell);
-            let snr_db = ChannelModel::NOMINAL.mean_snr_db(line_of_sight, log10_m(&sight, site, cell));
+            let snr_db = ChannelModel::NOMINAL
+                .mean_snr_db(line_of_sight, log10_m(sight.grid(), sight.altitude(), site, cell));
             DeviceState { cell: site, remaining: 5000.0, snr: Some(Db(snr_db + offset_db)) }
         };
         for x in 5..20 {

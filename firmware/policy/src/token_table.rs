@@ -2,7 +2,7 @@
 
 use crate::outlook::Outlook;
 use crate::vantage::{self, is_fast, nearest, vantage};
-use crate::yields::{self, REACH, Rates, WINDOW};
+use crate::yields::{self, NOMINAL, REACH, WINDOW};
 use crate::{ChannelOffset, DeviceState, LOCAL_MAP_CELLS, Situation, Slots, Tokens};
 use gleaner_units::{Cell, Grid, Metres, Sight};
 use heapless::Vec as Few;
@@ -19,11 +19,11 @@ const FAST_ROWS: usize = 2 * vantage::REACH as usize + 1;
 /// then limits it to the remaining data and adds it up around the aircraft. Vantages are kept for each pair of device
 /// and aircraft cell.
 ///
-/// Use one table for one city: the buildings behind [`Situation::sight`] must not change. A different grid, altitude or
-/// channel clears the table.
+/// Use one table for one city: the buildings behind [`Situation::sight`] must not change. A different grid or altitude
+/// clears the table. It is for the nominal channel; tokens of another one are built without it.
 #[derive(Clone, Debug, Default)]
 pub struct TokenTable {
-    key: Option<(Grid, Metres, ChannelOffset)>,
+    key: Option<(Grid, Metres)>,
     /// By grid index of the device.
     devices: Vec<Option<Box<Coverage>>>,
 }
@@ -44,7 +44,7 @@ struct Coverage {
 impl Coverage {
     /// # Cost
     /// One line-of-sight test for each cell in range.
-    fn new(rates: &Rates, sight: &dyn Sight, device: Cell) -> Coverage {
+    fn new(sight: &dyn Sight, device: Cell) -> Coverage {
         let grid = sight.grid();
         let stride = usize::from(grid.width()) + COLUMNS;
         let margin = REACH as usize;
@@ -52,7 +52,7 @@ impl Coverage {
         for cell in grid.cells() {
             let place = (cell.y as usize + margin) * stride + cell.x as usize + margin;
             if let (Some(units), Some(place)) =
-                (yields::stay_units(rates, sight, device, cell), stay_units.get_mut(place))
+                (yields::stay_units(&NOMINAL, sight, device, cell), stay_units.get_mut(place))
             {
                 *place = units as u16;
             }
@@ -62,7 +62,7 @@ impl Coverage {
             for (bit, east) in (0..FAST_ROWS).zip(-vantage::REACH..) {
                 let cell = Cell::new(device.x.saturating_add(east), device.y.saturating_add(north));
                 let cells2 = i32::from(east) * i32::from(east) + i32::from(north) * i32::from(north);
-                *row |= u16::from(is_fast(rates, sight, device, cell, cells2)) << bit;
+                *row |= u16::from(is_fast(&NOMINAL, sight, device, cell, cells2)) << bit;
             }
         }
         Coverage { stay_units, stride, vantages: vec![None; grid.len()], fast }
@@ -105,15 +105,17 @@ impl TokenTable {
         situation: &Situation<'_>,
         devices: impl IntoIterator<Item = DeviceState>,
     ) -> (Tokens, Slots) {
-        let key = (situation.sight.grid(), situation.sight.altitude(), situation.channel);
-        let Some(aircraft) = key.0.index(situation.cell) else { return Tokens::build(situation, devices) };
+        let key = (situation.sight.grid(), situation.sight.altitude());
+        let is_nominal = situation.channel == ChannelOffset::NONE;
+        let Some(aircraft) = key.0.index(situation.cell).filter(|_| is_nominal) else {
+            return Tokens::build(situation, devices);
+        };
         if self.key != Some(key) {
             self.key = Some(key);
             self.devices = vec![None; key.0.len()];
         }
         let mut outlook = Tabled {
             table: self,
-            rates: Rates::of(situation.channel),
             grid: key.0,
             sight: situation.sight,
             center: situation.cell,
@@ -126,7 +128,6 @@ impl TokenTable {
 
 struct Tabled<'a> {
     table: &'a mut TokenTable,
-    rates: Rates,
     grid: Grid,
     sight: &'a dyn Sight,
     center: Cell,
@@ -138,13 +139,12 @@ struct Tabled<'a> {
 /// `None` for a device outside the grid.
 fn coverage<'t>(
     table: &'t mut TokenTable,
-    rates: &Rates,
     grid: Grid,
     sight: &dyn Sight,
     device: Cell,
 ) -> Option<&'t mut Coverage> {
     let place = table.devices.get_mut(grid.index(device)?)?;
-    Some(place.get_or_insert_with(|| Box::new(Coverage::new(rates, sight, device))))
+    Some(place.get_or_insert_with(|| Box::new(Coverage::new(sight, device))))
 }
 
 impl Outlook for Tabled<'_> {
@@ -152,17 +152,17 @@ impl Outlook for Tabled<'_> {
         if device.remaining.is_nan() || device.remaining <= 0.0 {
             return;
         }
-        match coverage(self.table, &self.rates, self.grid, self.sight, device.cell) {
+        match coverage(self.table, self.grid, self.sight, device.cell) {
             // The cast saturates at more than any stay collects.
             Some(coverage) => coverage.add(&mut self.window, self.center, device.remaining as u16),
-            None => yields::add(&mut self.window, &self.rates, self.sight, self.center, device),
+            None => yields::add(&mut self.window, &NOMINAL, self.sight, self.center, device),
         }
     }
 
     fn vantage(&mut self, device: Cell) -> [f32; 2] {
         let (sight, center, aircraft) = (self.sight, self.center, self.aircraft);
-        let Some(coverage) = coverage(self.table, &self.rates, self.grid, sight, device) else {
-            return vantage(&self.rates, sight, device, center);
+        let Some(coverage) = coverage(self.table, self.grid, sight, device) else {
+            return vantage(&NOMINAL, sight, device, center);
         };
         if let Some(&Some(known)) = coverage.vantages.get(aircraft) {
             return known;

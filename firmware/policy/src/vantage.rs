@@ -64,7 +64,7 @@ pub(crate) fn nearest(device: Cell, from: Cell, is_fast: impl Fn(Cell, i32) -> b
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ChannelOffset;
+    use crate::yields::NOMINAL;
     use gleaner_units::{Grid, HeightMap, Metres, Rays};
 
     fn flat() -> HeightMap {
@@ -73,12 +73,7 @@ mod tests {
 
     fn seen(heights: &HeightMap, device: (i16, i16), from: (i16, i16)) -> [f32; 2] {
         let rays = Rays { heights, altitude_m: 60 };
-        vantage(
-            &Rates::of(ChannelOffset::NONE),
-            &rays,
-            Cell::new(device.0, device.1),
-            Cell::new(from.0, from.1),
-        )
+        vantage(&NOMINAL, &rays, Cell::new(device.0, device.1), Cell::new(from.0, from.1))
     }
 
     #[test]
@@ -107,9 +102,8 @@ mod tests {
     fn device_without_a_vantage_is_its_own() {
         let heights = flat();
         let rays = |altitude_m| Rays { heights: &heights, altitude_m };
-        let rates = Rates::of(ChannelOffset::NONE);
-        assert_eq!(vantage(&rates, &rays(200), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
+        assert_eq!(vantage(&NOMINAL, &rays(200), Cell::new(5, 5), Cell::new(9, 2)), [-4.0, 3.0]);
         let beyond = Cell::new(i16::MAX, i16::MIN);
-        assert_eq!(vantage(&rates, &rays(60), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
+        assert_eq!(vantage(&NOMINAL, &rays(60), beyond, Cell::new(0, 0)), [32767.0, -32768.0]);
     }
 }

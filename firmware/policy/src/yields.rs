@@ -12,7 +12,7 @@
 //! the mission. The terminal's offset alone does not show this: it is scaled for the whole city, so one cell is a small
 //! number, and policies without the mark entered the terminal by mistake.
 
-use crate::schema::{TERMINAL_UNITS, YIELD_STEP_UNITS};
+use crate::schema::{REACHABLE_SNR_DB, TERMINAL_UNITS, YIELD_STEP_UNITS};
 use crate::{ChannelOffset, DeviceState, LOCAL_MAP_CELLS, LOCAL_MAP_SIDE};
 use gleaner_units::{Cell, Sight};
 use heapless::Vec;
@@ -29,22 +29,22 @@ const SLOTS: f32 = 10.0;
 const STEPS_MAX: u16 = 255;
 
 const ENTRIES: usize = 64;
-/// The nominal channel: SNR at 1 m (dB), path-loss exponent, lowest SNR (dB), and data units for each bit per second per
+/// The nominal channel: SNR at 1 m (dB), path-loss exponent, and data units for each bit per second per
 /// hertz (paper, eq. 6 and the table of simulation parameters; the paper leaves the noise level open, this is the simulated
 /// world's).
 const SNR_AT_1M_DB: f32 = 66.0;
 const EXPONENT: f32 = 2.5;
-const THRESHOLD_DB: f32 = 5.0;
 const SLOT_UNITS: f32 = 100.0;
 /// The first entry is computed at the lowest flight altitude, 20 m.
 const LOWEST_M2: f32 = 400.0;
 
 /// Data units per slot with line of sight, by the square of the 3-D distance in steps of [`TABLE_STEP_M2`]:
-/// `100 log2(1 + SNR)`, and 0 below the threshold.
+/// `100 log2(1 + SNR)`, and 0 below [`REACHABLE_SNR_DB`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rates([u16; ENTRIES]);
 
-const NOMINAL: Rates = Rates([
+/// The rates of the nominal channel.
+pub(crate) const NOMINAL: Rates = Rates([
     1112, 914, 789, 717, 665, 626, 593, 566, 542, 522, 503, 486, 471, 457, 445, 433, 422, 412, 402, 393, 384,
     376, 368, 361, 354, 347, 341, 334, 329, 323, 317, 312, 307, 302, 298, 293, 289, 284, 280, 276, 272, 269,
     265, 261, 258, 255, 251, 248, 245, 242, 239, 236, 233, 230, 228, 225, 223, 220, 218, 215, 213, 211, 208,
@@ -69,7 +69,7 @@ impl Rates {
         for (index, units) in (0_u8..).zip(&mut rates.0) {
             let distance_m2 = (f32::from(index) * TABLE_STEP_M2).max(LOWEST_M2);
             let snr_db = snr_at_1m_db - 5.0 * (EXPONENT + channel.exponent) * libm::log10f(distance_m2);
-            *units = if snr_db >= THRESHOLD_DB {
+            *units = if snr_db >= REACHABLE_SNR_DB {
                 let snr = exp2(snr_db * (0.1 * core::f32::consts::LOG2_10));
                 // The cast of half more rounds to the nearest.
                 (SLOT_UNITS * libm::log2f(1.0 + snr) + 0.5) as u16

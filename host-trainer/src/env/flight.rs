@@ -183,12 +183,12 @@ impl Flight {
             channel,
         };
         match &self.table {
-            Some(SharedTable(table)) if channel == ChannelOffset::NONE => {
+            Some(SharedTable(table)) => {
                 // A table is whole after each insertion, also when a thread has panicked in between.
                 let mut table = table.lock().unwrap_or_else(PoisonError::into_inner);
                 table.build(&situation, self.device_states()).0
             }
-            _ => Tokens::build(&situation, self.device_states()).0,
+            None => Tokens::build(&situation, self.device_states()).0,
         }
     }
 

@@ -96,7 +96,7 @@ fn mission<D: Deliberator>(mut deliberator: D, count: usize) -> Times {
         let (tokens, _) = Tokens::build(&situation, devices.iter().copied());
         let mask = guard.mask(cell, battery);
         let logits = deliberator.infer(&tokens).map_or([0.0; Action::COUNT], |answer| answer.logits);
-        let at = Place { cell, battery, preference: Preference::DATA, guard: &guard, sight: Some(&sight) };
+        let at = Place { cell, battery, preference: Preference::DATA, guard: &guard, sight: &sight };
         let choice = deliberator.propose(&at, devices.iter().copied(), &logits, mask, true);
         times.0.push(begun.elapsed());
         let action = choice.map_or(Action::Hover, |(action, _)| action);

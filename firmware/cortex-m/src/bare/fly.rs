@@ -2,7 +2,7 @@
 
 use super::defmt_log::Defmt;
 use super::{fault, images, now, serial};
-use crate::{Board, Cause, Parts, ResetRecord, Runtime, Services};
+use crate::{Board, Cause, Parts, Pilot, ResetRecord, Runtime, Services};
 use core::fmt;
 use core::mem::MaybeUninit;
 use gleaner_link::Severity;
@@ -24,7 +24,7 @@ impl Policy for BoardEngine {
 }
 
 static WORKSPACE: ConstStaticCell<Workspace> = ConstStaticCell::new(Workspace::new());
-static ONBOARD: StaticCell<Onboard<ChannelAware<Timed<BoardEngine>>>> = StaticCell::new();
+static ONBOARD: StaticCell<Pilot<BoardEngine>> = StaticCell::new();
 
 /// Boots the pilot and runs it forever.
 pub fn fly<B: Board>(parts: Parts<B>) -> ! {
@@ -47,7 +47,7 @@ pub fn fly<B: Board>(parts: Parts<B>) -> ! {
 
 /// The main loop. Not inlined, so that its stack frame is not added to those of the boot.
 #[inline(never)]
-fn run<B: Board>(onboard: &mut Onboard<ChannelAware<Timed<BoardEngine>>>, mut services: Services<B>) -> ! {
+fn run<B: Board>(onboard: &mut Pilot<BoardEngine>, mut services: Services<B>) -> ! {
     let mut runtime = Runtime::new(onboard, serial::link(), serial::radio());
     B::start_watchdog();
     loop {
@@ -81,9 +81,7 @@ impl fmt::Display for BootFault {
 /// Builds the pilot and loads mission and model. The pilot is built in its final place, and each step has a stack
 /// frame that ends before the next one starts: the stack is smaller than a pilot.
 #[inline(never)]
-fn boot(
-    parameters: &Parameters,
-) -> (&'static mut Onboard<ChannelAware<Timed<BoardEngine>>>, Vec<BootFault, 2>) {
+fn boot(parameters: &Parameters) -> (&'static mut Pilot<BoardEngine>, Vec<BootFault, 2>) {
     let mut faults = Vec::new();
     let (Some(workspace), Some(place)) = (WORKSPACE.try_take(), ONBOARD.try_uninit()) else {
         fault::end(Cause::Panic { line: line!() })
@@ -109,20 +107,17 @@ fn engine(workspace: &'static mut Workspace) -> Result<NativePolicy<'static>, Bo
 /// Builds a pilot without mission in `place`.
 #[inline(never)]
 fn ground(
-    place: &'static mut MaybeUninit<Onboard<ChannelAware<Timed<BoardEngine>>>>,
+    place: &'static mut MaybeUninit<Pilot<BoardEngine>>,
     parameters: Parameters,
     engine: BoardEngine,
-) -> &'static mut Onboard<ChannelAware<Timed<BoardEngine>>> {
+) -> &'static mut Pilot<BoardEngine> {
     let Ok(ids) = Settings::default().checked() else { fault::end(Cause::Panic { line: line!() }) };
     place.write(Onboard::grounded(parameters, ids, ChannelAware::new(Timed::new(engine, now))))
 }
 
 /// Loads the mission from flash. A pilot without mission communicates but does not engage.
 #[inline(never)]
-fn load(
-    onboard: &mut Onboard<ChannelAware<Timed<BoardEngine>>>,
-    tested: Result<(), SelfTestError>,
-) -> Result<(), BootFault> {
+fn load(onboard: &mut Pilot<BoardEngine>, tested: Result<(), SelfTestError>) -> Result<(), BootFault> {
     let mission = mission_image::decode(images::mission()).map_err(BootFault::Mission)?;
     onboard.load(&mission, tested).map_err(|_| BootFault::Impossible)
 }

@@ -157,23 +157,20 @@ fn rays<'a>(scene: &Scene<'a>) -> Rays<'a> {
     Rays { heights: &scene.mission.heights, altitude_m }
 }
 
-/// Line of sight where there is a map. A map without any building is none: the model would take every link for unobstructed.
-fn mapped<'a>(rays: &'a Rays<'_>) -> Option<&'a dyn Sight> {
-    (rays.heights.tallest().0 > 0.0).then_some(rays as &dyn Sight)
-}
-
 fn begin<D: Deliberator>(policy: &mut D, scene: &Scene<'_>) {
+    let rays = rays(scene);
+    // A map without any building is no map: the model would take every link for unobstructed.
+    let has_map = rays.heights.tallest().0 > 0.0;
     let sites = scene.mission.devices.iter();
     let full = sites.map(|site| DeviceState { cell: site.cell, remaining: site.data, snr: None });
-    policy.begin(mapped(&rays(scene)), full, scene.mission.seed());
+    policy.begin(has_map.then_some(&rays as &dyn Sight), full, scene.mission.seed());
 }
 
 /// Tells what was heard, and lets the look-ahead choose among the actions that the guard allows.
 fn propose<D: Deliberator>(policy: &mut D, scene: &Scene<'_>, decision: &mut Decision) {
     let Some(inference) = &decision.inference else { return };
     let Decision { cell, battery, preference, mask, .. } = *decision;
-    let rays = rays(scene);
-    let place = Place { cell, battery, preference, guard: scene.guard, sight: mapped(&rays) };
+    let place = Place { cell, battery, preference, guard: scene.guard, sight: &rays(scene) };
     let devices = device_states(scene.mission, scene.inputs.devices);
     let is_on = scene.inputs.parameters.looks_ahead();
     let proposed = policy.propose(&place, devices, &inference.logits, mask, is_on);

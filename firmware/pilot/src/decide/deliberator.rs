@@ -22,8 +22,8 @@ pub struct Place<'a> {
     pub preference: Preference,
     /// Fence, terminal and reserve.
     pub guard: &'a Guard,
-    /// Line of sight; `None` without a map of buildings.
-    pub sight: Option<&'a dyn Sight>,
+    /// Line of sight over the mission's buildings.
+    pub sight: &'a dyn Sight,
 }
 
 /// How the look-ahead came to an action.
@@ -106,13 +106,13 @@ impl<P: Policy> Deliberator for P {
     }
 }
 
-/// A network alone, with yield map and vantages of the channel as estimated in flight: 150 bytes beside the network.
+/// A network alone, with yield map and vantages of the channel as estimated in flight.
 #[derive(Clone, Debug)]
 pub struct ChannelAware<P> {
     policy: P,
     estimator: ChannelEstimator,
-    /// Whether a slot of this mission was heard.
-    has_listened: bool,
+    /// Whether the mission has a map; without one every link would count as unobstructed.
+    has_map: bool,
 }
 
 impl<P> ChannelAware<P> {
@@ -120,7 +120,7 @@ impl<P> ChannelAware<P> {
     #[must_use]
     pub const fn new(policy: P) -> ChannelAware<P> {
         let estimator = ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
-        ChannelAware { policy, estimator, has_listened: false }
+        ChannelAware { policy, estimator, has_map: false }
     }
 
     /// The network.
@@ -137,9 +137,9 @@ impl<P: Policy> Deliberator for ChannelAware<P> {
         self.policy.infer(tokens).ok()
     }
 
-    fn begin(&mut self, _: Option<&dyn Sight>, _: impl Iterator<Item = DeviceState>, _: u32) {
+    fn begin(&mut self, sight: Option<&dyn Sight>, _: impl Iterator<Item = DeviceState>, _: u32) {
         self.estimator.begin();
-        self.has_listened = false;
+        self.has_map = sight.is_some();
     }
 
     fn propose(
@@ -150,9 +150,8 @@ impl<P: Policy> Deliberator for ChannelAware<P> {
         _: ActionMask,
         _: bool,
     ) -> Option<(Action, LookAheadRecord)> {
-        if let Some(sight) = place.sight {
-            self.estimator.listen(sight, place.cell, devices);
-            self.has_listened = true;
+        if self.has_map {
+            self.estimator.listen(place.sight, place.cell, devices);
         }
         None
     }
@@ -162,7 +161,7 @@ impl<P: Policy> Deliberator for ChannelAware<P> {
     }
 
     fn channel(&self) -> Option<ChannelEstimate> {
-        self.has_listened.then(|| self.estimator.fit().estimate())
+        self.estimator.estimate()
     }
 }
 

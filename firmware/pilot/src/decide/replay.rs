@@ -10,7 +10,7 @@ use super::{
 use gleaner_guard::Guard;
 use gleaner_lookahead::Budget;
 use gleaner_policy::{DeviceState, Inference, Policy, Preference, Tokens};
-use gleaner_units::{Action, BatteryUnits, Cell, Db, Rays, Sight};
+use gleaner_units::{Action, BatteryUnits, Cell, Db, HeightMap, Rays, Sight};
 
 /// A decision made again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +32,7 @@ struct UnderWay {
     run_s: u64,
     planner: LookingAhead<NoNetwork>,
     mission: LoggedMission,
+    heights: HeightMap,
     guard: Guard,
     next: u16,
 }
@@ -80,7 +81,7 @@ impl UnderWay {
         let has_map = heights.tallest().0 > 0.0;
         let mut planner = LookingAhead::new(NoNetwork, Budget::NONE);
         planner.begin(has_map.then_some(&rays as &dyn Sight), mission.sites(), entry.record.seed);
-        Some(UnderWay { run_s, planner, mission, guard, next: 0 })
+        Some(UnderWay { run_s, planner, mission, heights, guard, next: 0 })
     }
 
     fn decide(
@@ -96,8 +97,7 @@ impl UnderWay {
             battery: BatteryUnits(logged.battery),
             preference: Preference::new(logged.w_data)?,
             guard: &self.guard,
-            // The planner has kept line of sight since the mission began.
-            sight: None,
+            sight: &Rays { heights: &self.heights, altitude_m: self.mission.altitude_m },
         };
         let devices = self.mission.sites().zip(&entry.devices).map(|(site, device)| DeviceState {
             remaining: device.remaining,
