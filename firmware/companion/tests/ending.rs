@@ -6,6 +6,7 @@ use fixture::vehicle::{FakeAutopilot, Running};
 use fixture::{Fixture, outcome};
 use gleaner_link::Message;
 use mavlink::dialects::ardupilotmega::*;
+use std::collections::BTreeSet;
 use std::os::unix::net::UnixDatagram;
 use std::time::Duration;
 
@@ -32,6 +33,7 @@ fn sigterm_in_flight_hands_the_aircraft_back() {
     autopilot.engage();
     running.process.signal("TERM");
     autopilot.until(|_, message| is_return(message).then_some(()));
+    autopilot.await_text("gleaner: stopped in flight, take over now");
     // The operator's LOITER ends the request at once.
     autopilot.custom_mode = LOITER;
     autopilot.send_state();
@@ -48,10 +50,9 @@ fn a_killed_run_is_reported_by_the_next_one() {
     autopilot.engage();
     running.says("-> engaged");
     let note = fixture.path("state/last_run.toml");
-    while !std::fs::read_to_string(&note).is_ok_and(|text| text.contains("engaged")) {
-        autopilot.send_state();
-        autopilot.drain(|_, _| None::<()>);
-    }
+    // A thread writes the note, when the disk permits.
+    let noted = || std::fs::read_to_string(&note).is_ok_and(|text| text.contains("engaged"));
+    autopilot.until(|_, _| noted().then_some(()));
     let (code, _) = running.stop_by("KILL");
     assert_eq!(code, None);
 
@@ -170,18 +171,18 @@ fn a_ground_station_on_its_own_port_is_served() {
     autopilot.until(|_, message| matches!(message, Message::Heartbeat(_)).then_some(()));
     ground.hello();
     // The autopilot's heartbeats are forwarded, and ours arrive as well.
-    let mut senders = Vec::new();
-    while senders.len() < 2 {
+    let mut senders = BTreeSet::new();
+    for _ in 0..100 {
         autopilot.send_state();
         ground.drain(|sender, message| {
-            if matches!(message, Message::Heartbeat(_)) && !senders.contains(&sender.component) {
-                senders.push(sender.component);
-            }
-            None::<()>
+            senders.extend(matches!(message, Message::Heartbeat(_)).then_some(sender.component));
+            (senders.len() == 2).then_some(())
         });
+        if senders.len() == 2 {
+            break;
+        }
     }
-    senders.sort_unstable();
-    assert_eq!(senders, [1, 191]);
+    assert_eq!(senders, BTreeSet::from([1, 191]));
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");
     assert!(rest.contains("ground port udpin:127.0.0.1:0: 1 packets in"), "{rest}");

@@ -1,9 +1,12 @@
 //! The server over real sockets: what a viewer gets, and what is refused.
 
-use gleaner_dashboard::{Access, Command, Event, Grid, Scene, Server, Text, Token};
+use gleaner_dashboard::{Access, Command, Event, Grid, Order, Scene, Server, Text, Token};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// A test fails instead of waiting for ever.
+const DEADLINE: Duration = Duration::from_secs(20);
 
 fn scene() -> Scene {
     Scene {
@@ -25,10 +28,10 @@ fn start(access: Access) -> Server {
     Server::start("127.0.0.1:0".parse().unwrap(), access, scene()).unwrap()
 }
 
-/// A connection on which a request was sent. Reading fails instead of waiting for ever.
+/// A connection on which a request was sent.
 fn ask(address: SocketAddr, request: &str, headers: &str, body: &str) -> BufReader<TcpStream> {
     let mut stream = TcpStream::connect(address).unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+    stream.set_read_timeout(Some(DEADLINE)).unwrap();
     let length = body.len();
     write!(
         stream,
@@ -43,6 +46,17 @@ fn status(reader: &mut BufReader<TcpStream>) -> u16 {
     let mut line = String::new();
     reader.read_line(&mut line).unwrap();
     line.split(' ').nth(1).unwrap().parse().unwrap()
+}
+
+fn next_order(server: &mut Server) -> Order {
+    let begun = Instant::now();
+    loop {
+        if let Some(order) = server.order() {
+            return order;
+        }
+        assert!(begun.elapsed() < DEADLINE, "no order arrived");
+        std::thread::yield_now();
+    }
 }
 
 /// Lines of the stream until one that begins with `start`.
@@ -83,12 +97,7 @@ fn a_viewer_gets_the_flight_and_then_its_events() {
 fn a_command_reaches_the_loop_and_its_answer_the_viewer() {
     let mut server = start(Access::Loopback);
     let mut reply = ask(server.address(), "POST /api/command", "", r#"{"preference":0.25}"#);
-    let order = loop {
-        if let Some(order) = server.order() {
-            break order;
-        }
-        std::thread::yield_now();
-    };
+    let order = next_order(&mut server);
     assert_eq!(order.command, Command::Preference(0.25));
     order.answer("acknowledged: accepted");
     assert_eq!(status(&mut reply), 200);
@@ -123,13 +132,7 @@ fn tokens_part_viewers_from_commanders() {
     assert_eq!(status(&mut ask(address, "POST /api/command", &bearer(&view_secret), command)), 403);
     assert!(server.order().is_none());
     let mut reply = ask(address, "POST /api/command", &bearer(&control_secret), command);
-    loop {
-        if let Some(order) = server.order() {
-            order.answer("acknowledged: accepted");
-            break;
-        }
-        std::thread::yield_now();
-    }
+    next_order(&mut server).answer("acknowledged: accepted");
     assert_eq!(status(&mut reply), 200);
 }
 
