@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use gleaner_host_trainer::env::flight::Flight;
+use gleaner_host_trainer::env::mismatch::{MapError, Mismatch};
 use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::env::variety::Variety;
 use gleaner_host_trainer::keep::snapshot::{LAST, Snapshot};
@@ -83,21 +84,28 @@ fn start_is_the_mean_of_several_runs() {
 }
 
 #[test]
-fn generated_cities_come_in_their_share_and_repeat() {
+fn generated_cities_and_differing_worlds_come_in_their_share_and_repeat() {
     let site = Site::default_site();
-    let variety = Variety::new(&site, 0.25);
-    let is_generated = |mission| variety.setting(mission).index > 0;
-    let count = (0..2_000).filter(|&mission| is_generated(mission)).count();
-    assert!((420..580).contains(&count), "{count} of 2000");
-    for mission in (0..200).filter(|&mission| is_generated(mission)) {
-        let setting = variety.setting(mission);
-        assert!(setting.reports_missing > 0.0);
-        assert_eq!(setting.index, variety.setting(mission).index);
+    let variety = Variety::new(&site, 0.25, 0.4);
+    let (mut generated, mut differing) = (0, 0);
+    for mission in 0..2_000 {
+        let (index, setting) = variety.setting(mission);
+        assert_eq!(index, variety.setting(mission).0);
         // The default start and terminal move to open ground.
-        settings(&[]).missions().mission(setting.site, mission).unwrap();
+        settings(&[]).missions().mission(&setting.site, mission).unwrap();
+        if setting.mismatch.missing_reports > 0.0 {
+            generated += 1;
+        } else if setting.mismatch != Mismatch::default() {
+            differing += 1;
+            assert_eq!(setting.map.is_some(), setting.mismatch.map != MapError::None);
+            let [noise, nominal] = [&setting.site, &site].map(|site| site.world().channel().noise);
+            assert!((noise.0 - nominal.0 - setting.mismatch.noise_db).abs() < 1e-4);
+        }
     }
-    let default_only = Variety::new(&site, 0.0);
-    assert!((0..200).all(|mission| default_only.setting(mission).index == 0));
+    assert!((420..580).contains(&generated) && (540..660).contains(&differing), "{generated} {differing}");
+    let own = Variety::new(&site, 0.0, 0.0);
+    assert!((0..200).all(|mission| own.setting(mission).0 == 0));
+    assert_eq!(own.settings().count(), 1);
 }
 
 #[test]

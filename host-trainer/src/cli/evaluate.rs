@@ -5,12 +5,12 @@ use super::oracle::{bar, known, plan, prove, read_or_shipped};
 use super::site::SiteArguments;
 use super::{model, snapshot_in};
 use anyhow::{Result, bail};
+use gleaner_host_trainer::env::mismatch::{MapError, Mismatch};
 use gleaner_host_trainer::env::site::Site;
 use gleaner_host_trainer::judge::evaluation::{
     Decider, Engine, Missions, Table, fly_all_as, fly_greedy, test_preferences,
 };
 use gleaner_host_trainer::judge::lookahead::LookingAhead;
-use gleaner_host_trainer::judge::mismatch::{MapError, Mismatch};
 use gleaner_host_trainer::judge::paper::Setting;
 use gleaner_host_trainer::planner::oracle::Thoroughness;
 use gleaner_host_trainer::planner::{DEVICES_MAX, Rates};

@@ -199,14 +199,22 @@ fn scenario_name(settings: &Settings) -> String {
         100.0 * (1.0 - settings.share_rd - settings.share_rb),
         100.0 * settings.share_varied
     );
-    if settings.share_cities == 0.0 {
-        return usual;
+    let mut all = usual;
+    if settings.share_cities > 0.0 {
+        all += &format!(
+            "; {:.0} % of all over generated cities, under a channel that is off by up to 2 dB, half of them with \
+             Rayleigh fading, a tenth of the reports missing",
+            100.0 * settings.share_cities
+        );
     }
-    format!(
-        "{usual}; {:.0} % of all over generated cities, under a channel that is off by up to 2 dB, half of them with \
-         Rayleigh fading, a tenth of the reports missing",
-        100.0 * settings.share_cities
-    )
+    if settings.share_mismatched > 0.0 {
+        all += &format!(
+            "; {:.0} % of the others with noise off by up to 6 dB or exponents by up to 0.3, half of them with a wrong \
+             map or none",
+            100.0 * settings.share_mismatched
+        );
+    }
+    all
 }
 
 /// The commit of the git repository here, if there are both.

@@ -1,6 +1,6 @@
 //! `evaluate` in a world that differs from the policy's model.
 
-use gleaner_host_trainer::judge::mismatch::{MapError, Mismatch};
+use gleaner_host_trainer::env::mismatch::{MapError, Mismatch};
 use gleaner_world::Fading;
 use std::fmt;
 use std::str::FromStr;

@@ -3,11 +3,15 @@
 use crate::env::flight::Flight;
 use gleaner_units::{Cell, Db, HeightMap};
 use gleaner_world::{Channel, City, Fading, Seed, Stream, World};
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use std::sync::Arc;
 
 /// The largest height of a building on a map with wrong heights, m: below flight altitude.
 const HEIGHT_MAX_M: i16 = 55;
+/// Largest error of the noise level in training, dB.
+const NOISE_ERROR_DB: f32 = 6.0;
+/// Largest error of the path-loss exponents in training.
+const EXPONENT_ERROR: f32 = 0.3;
 
 /// The error of the map on board.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,6 +43,25 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
+    /// A difference to train with: noise off by up to 6 dB or exponents by up to 0.3, in half of them with a map that lacks
+    /// a tenth of the buildings, that has wrong heights, or that is missing.
+    #[must_use]
+    pub fn draw(rng: &mut impl Rng) -> Mismatch {
+        let (mut noise_db, mut exponent) = (0.0, 0.0);
+        if rng.random() {
+            noise_db = rng.random_range(-NOISE_ERROR_DB..=NOISE_ERROR_DB);
+        } else {
+            exponent = rng.random_range(-EXPONENT_ERROR..=EXPONENT_ERROR);
+        }
+        let map = match rng.random_range(0..6) {
+            0 => MapError::Missing(0.1),
+            1 => MapError::Heights(10),
+            2 => MapError::Flat,
+            _ => MapError::None,
+        };
+        Mismatch { noise_db, exponent, map, ..Mismatch::default() }
+    }
+
     /// Whether the channel is the nominal one; map and reports may still be wrong.
     #[must_use]
     pub fn channel_is_nominal(&self) -> bool {

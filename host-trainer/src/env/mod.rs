@@ -3,6 +3,7 @@
 pub mod distribution;
 pub mod flight;
 pub mod greedy;
+pub mod mismatch;
 pub mod mission;
 pub mod site;
 pub mod variety;

@@ -2,10 +2,10 @@
 //! assumes. All at w = (1, 0), where the differences are largest.
 
 use crate::env::flight::Flight;
+use crate::env::mismatch::{MapError, Mismatch};
 use crate::judge::evaluation::{Decider, DeciderError, Engine, fly_all, fly_all_as, fly_greedy};
 use crate::judge::interval::Interval;
 use crate::judge::lookahead::LookingAhead;
-use crate::judge::mismatch::{MapError, Mismatch};
 use crate::judge::paper::Setting;
 use gleaner_lookahead::Budget;
 use gleaner_policy::{Policy, Preference};

@@ -5,7 +5,6 @@ pub mod evaluation;
 pub mod explanation;
 pub mod interval;
 pub mod lookahead;
-pub mod mismatch;
 pub mod paper;
 pub mod pareto;
 pub mod robustness;

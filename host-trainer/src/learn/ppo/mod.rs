@@ -123,7 +123,7 @@ impl Refinement {
             None => Stored::start(first, others, confidence, &mut rng),
         };
         let constants = PpoSettings::DEFAULT;
-        let variety = Variety::new(&site, settings.share_cities);
+        let variety = Variety::new(&site, settings.share_cities, settings.share_mismatched);
         let missions = Missions::new(&settings, variety, constants);
         let mut flights = std::mem::take(&mut stored.flights);
         let more = flights.len() as u64..constants.flights;

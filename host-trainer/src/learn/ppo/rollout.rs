@@ -1,15 +1,17 @@
 //! Rollouts: flights in progress, the planner's estimate beside them, and the recorded slots.
 
 use crate::env::flight::Flight;
+use crate::env::mismatch::MapError;
 use crate::env::mission::MissionSource;
-use crate::env::variety::{Setting, Variety};
+use crate::env::variety::Variety;
 use crate::learn::ppo::settings::PpoSettings;
 use crate::learn::trainer::TrainError;
 use crate::net::Sample;
 use crate::observe::tokens;
 use crate::planner::{Prospect, Rates, W_DATA_MAX};
 use crate::settings::Settings;
-use gleaner_policy::{Preference, View};
+use gleaner_lookahead::{ChannelEstimator, ChannelModel, FitSettings};
+use gleaner_policy::{ChannelOffset, Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::{ScenarioKind, Stream};
 use rand_chacha::ChaCha8Rng;
@@ -49,6 +51,8 @@ pub(super) struct RolloutFlight {
     pub view: View,
     pub actions: Vec<u8>,
     pub flight: Flight,
+    /// As on board: fits the channel to the reports, on the map. `None` where the map is missing.
+    pub estimator: Option<ChannelEstimator>,
     pub prospect: Prospect,
     /// The planner's value of the current state, utility.
     pub planner_value: f32,
@@ -62,7 +66,7 @@ pub(super) struct RolloutFlight {
 pub(super) struct Missions {
     source: MissionSource,
     variety: Variety,
-    /// Rate tables of the planner, by site.
+    /// Rate tables of the planner, by setting.
     rates: Vec<Rates>,
     has_return_base: bool,
     constants: PpoSettings,
@@ -72,7 +76,7 @@ impl Missions {
     pub fn new(settings: &Settings, variety: Variety, constants: PpoSettings) -> Missions {
         Missions {
             source: settings.missions(),
-            rates: variety.sites().iter().map(|site| Rates::new(site.world().clone())).collect(),
+            rates: variety.settings().map(|setting| Rates::new(setting.site.world().clone())).collect(),
             variety,
             has_return_base: settings.share_rb > 0.0,
             constants,
@@ -82,7 +86,8 @@ impl Missions {
     /// Starts the mission with this number. Parallel flights interleave the numbers: each continues with the mission
     /// [`PpoSettings::flights`] later.
     pub fn begin(&self, mission: u64) -> Result<RolloutFlight, TrainError> {
-        let Setting { index, site, reports_missing } = self.variety.setting(mission);
+        let (index, setting) = self.variety.setting(mission);
+        let site = &setting.site;
         let mut drawn = self.source.mission(site, mission)?;
         let (round, place) = (mission / self.constants.flights, mission % self.constants.flights);
         if place < self.constants.shortest && self.has_return_base {
@@ -90,10 +95,13 @@ impl Missions {
             drawn.realization = site.realization(&scenario, drawn.seed)?;
             drawn.preference = Preference::ENERGY;
         }
-        let flight = Flight::new(site.world(), &drawn.realization, drawn.seed, drawn.preference)?
-            .with_reports_missing(reports_missing, drawn.seed);
-        // Tables of all generated cities would fill the memory.
-        let flight = if index == 0 { flight.with_table(site.table()) } else { flight };
+        let flight = Flight::new(site.world(), &drawn.realization, drawn.seed, drawn.preference)?;
+        let flight = setting.mismatch.prepare(flight, setting.map.as_ref(), drawn.seed);
+        let flight = match &setting.table {
+            Some(table) => flight.with_table(table),
+            None => flight,
+        };
+        let has_map = setting.mismatch.map != MapError::Flat;
         let mut prospect = Prospect::new(self.rates[index].study(&drawn.realization), mission);
         let planner_value = prospect.value(&flight);
         Ok(RolloutFlight {
@@ -101,6 +109,7 @@ impl Missions {
             view: View::ALL[(round + place) as usize % View::ALL.len()],
             actions: Vec::new(),
             flight,
+            estimator: has_map.then(|| ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT)),
             prospect,
             planner_value,
             is_prompted: false,
@@ -127,7 +136,8 @@ impl Missions {
 impl RolloutFlight {
     /// The policy's input, in the view.
     pub fn observe(&self) -> Sample {
-        tokens::sample(&self.flight).seen(self.view)
+        let channel = self.estimator.as_ref().map_or(ChannelOffset::NONE, ChannelEstimator::for_tokens);
+        tokens::normalise(&self.flight.tokens_with(channel)).seen(self.view)
     }
 
     /// The guard's mask, in the view.
@@ -143,6 +153,10 @@ impl RolloutFlight {
     /// Flies one slot; returns its reward, utility.
     pub fn step(&mut self, action: Action) -> f32 {
         self.actions.push(action.index() as u8);
+        if let Some(estimator) = &mut self.estimator {
+            let flight = &self.flight;
+            estimator.listen(flight.map(), flight.episode().uav(), flight.device_states());
+        }
         let [data, energy] = self.flight.step(action);
         let w_data = self.flight.preference().w_data().min(W_DATA_MAX);
         self.planner_value = self.prospect.value(&self.flight);
@@ -151,5 +165,33 @@ impl RolloutFlight {
 
     pub fn stored(&self) -> StoredFlight {
         StoredFlight { mission: self.mission, actions: self.actions.clone(), is_prompted: self.is_prompted }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::env::site::Site;
+
+    #[test]
+    fn in_a_weak_channel_the_policy_sees_the_estimated_one() {
+        let settings = Settings { share_mismatched: 1.0, ..Settings::default() };
+        let variety = Variety::new(&Site::default_site(), 0.0, settings.share_mismatched);
+        let is_weak = |mission: &u64| {
+            let mismatch = variety.setting(*mission).1.mismatch;
+            mismatch.noise_db > 4.0 && mismatch.map == MapError::None
+        };
+        let mission = (0..500).find(is_weak).expect("one in twelve worlds is weak");
+        let missions = Missions::new(&settings, variety, PpoSettings::DEFAULT);
+        let mut flight = missions.begin(mission).unwrap();
+        let nominal = |flight: &RolloutFlight| tokens::sample(&flight.flight).seen(flight.view);
+        assert_eq!(flight.observe(), nominal(&flight), "nothing was heard yet");
+        for _ in 0..12 {
+            let away = flight.flight.mask().iter().find(|&action| action != Action::Hover);
+            flight.step(away.unwrap());
+        }
+        assert_ne!(flight.observe(), nominal(&flight));
+        let restored = missions.restore(flight.stored()).unwrap();
+        assert_eq!(restored.observe(), flight.observe());
     }
 }
