@@ -97,7 +97,7 @@ pub struct Choice {
 /// About 5 kilobytes and 0.3 kilobytes a device.
 #[derive(Clone, Debug)]
 pub struct LookAhead<const D: usize> {
-    estimator: ChannelEstimator,
+    estimator: ChannelEstimator<D>,
     links: Links<D>,
     rates: Rates,
     initial_units: f32,
@@ -296,7 +296,8 @@ impl<const D: usize> LookAhead<D> {
         self.estimator.advance();
         let (grid, altitude) = (self.links.grid(), self.links.altitude());
         for (device, heard) in view.devices.iter().enumerate() {
-            let Some(snr_db) = heard.snr_db() else { continue };
+            let from_here = |&snr_db: &f32| self.estimator.is_from(device, snr_db, view.cell);
+            let Some(snr_db) = heard.snr_db().filter(from_here) else { continue };
             let mapped = self.links.sees(device, index);
             let link = (mapped, log10_m(grid, altitude, heard.cell, view.cell));
             let doubt = self.estimator.doubt(link, snr_db);

@@ -11,25 +11,28 @@ pub(crate) const CONTRADICTION: f32 = 4.0;
 /// Information of a report that contradicts the map, compared to one that agrees with it.
 const DOUBTFUL: f32 = 0.25;
 
-/// Fits the channel to live SNR, slot by slot. It is all that a board without look-ahead needs.
+/// Fits the channel to live SNR of up to `D` devices, slot by slot. It is all that a board without look-ahead needs.
 #[derive(Clone, Debug)]
-pub struct ChannelEstimator {
+pub struct ChannelEstimator<const D: usize> {
     channel: ChannelModel,
     settings: FitSettings,
     fit: ChannelFit,
     cell: Option<Cell>,
     /// Slots in a row over the present cell.
     stay: u32,
+    /// By device: SNR of the last report, dB, and the cell over which it was received; not a number before the first.
+    last: [(f32, Cell); D],
 }
 
 /// A link as the map has it: with line of sight or not, and the decimal logarithm of its length in metres.
 pub(crate) type Link = (bool, f32);
 
-impl ChannelEstimator {
+impl<const D: usize> ChannelEstimator<D> {
     /// The prior: this channel.
     #[must_use]
-    pub const fn new(channel: ChannelModel, settings: FitSettings) -> ChannelEstimator {
-        ChannelEstimator { channel, settings, fit: ChannelFit::new(&settings), cell: None, stay: 0 }
+    pub const fn new(channel: ChannelModel, settings: FitSettings) -> ChannelEstimator<D> {
+        let (fit, last) = (ChannelFit::new(&settings), [(f32::NAN, Cell::new(0, 0)); D]);
+        ChannelEstimator { channel, settings, fit, cell: None, stay: 0, last }
     }
 
     /// Begins a mission: discards the fit.
@@ -67,7 +70,8 @@ impl ChannelEstimator {
         self.fit.for_tokens(&self.settings)
     }
 
-    /// Takes the reports of a slot over `cell`; the map decides line of sight.
+    /// Takes the reports of a slot over `cell`, of the same devices in the same order in every slot; the map decides line of
+    /// sight.
     ///
     /// # Cost
     /// One ray for each device with a report.
@@ -78,8 +82,10 @@ impl ChannelEstimator {
             return;
         }
         self.advance();
-        for device in devices {
-            let Some(snr_db) = device.snr_db() else { continue };
+        for (index, device) in devices.into_iter().enumerate() {
+            let Some(snr_db) = device.snr_db().filter(|&snr_db| self.is_from(index, snr_db, cell)) else {
+                continue;
+            };
             let link = (sight.sees(device.cell, cell), log10_m(grid, altitude, device.cell, cell));
             let doubt = self.doubt(link, snr_db);
             self.take(link, snr_db, doubt);
@@ -97,6 +103,16 @@ impl ChannelEstimator {
     /// Lets the channel drift for a slot.
     pub(crate) fn advance(&mut self) {
         self.fit.advance(&self.settings);
+    }
+
+    /// Whether a device's report was received over this cell. A report counts as received for some seconds, and the aircraft
+    /// flies on: an SNR with the same bits as over another cell is still the report from there.
+    pub(crate) fn is_from(&mut self, device: usize, snr_db: f32, cell: Cell) -> bool {
+        let Some(last) = self.last.get_mut(device) else { return true };
+        if last.0 != snr_db {
+            *last = (snr_db, cell);
+        }
+        last.1 == cell
     }
 
     /// How much better the other link condition explains an SNR: the logarithm of the likelihood ratio.
@@ -138,7 +154,7 @@ mod tests {
         let mut heights = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
         heights.set(Cell::new(12, 10), 50);
         let sight = Rays { heights: &heights, altitude_m: 60 };
-        let mut estimator = ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
+        let mut estimator = ChannelEstimator::<2>::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
         let site = Cell::new(14, 10);
         let report = |cell: Cell, offset_db: f32| {
             let line_of_sight = sight.sees(site, cell);
@@ -156,6 +172,23 @@ mod tests {
         estimator.begin();
         assert_eq!(estimator.for_tokens(), ChannelOffset::NONE);
         estimator.listen(&sight, Cell::new(-1, 50), [report(Cell::new(5, 10), -20.0)]);
-        assert_eq!(estimator.fit(), ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT).fit());
+        let fresh = ChannelEstimator::<2>::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
+        assert_eq!(estimator.fit(), fresh.fit());
+    }
+
+    /// A device falls silent while the aircraft flies towards it: its last report is from far away.
+    #[test]
+    fn a_held_report_is_one_piece_of_evidence() {
+        let heights = HeightMap::flat(Grid::new(40, 30, Metres(20.0)).unwrap());
+        let sight = Rays { heights: &heights, altitude_m: 60 };
+        let site = Cell::new(20, 10);
+        let log10_m = log10_m(sight.grid(), sight.altitude(), site, Cell::new(5, 10));
+        let snr_db = ChannelModel::NOMINAL.mean_snr_db(true, log10_m);
+        let held = DeviceState { cell: site, remaining: 5000.0, snr: Some(Db(snr_db)) };
+        let mut estimator = ChannelEstimator::<1>::new(ChannelModel::NOMINAL, FitSettings::DEFAULT);
+        for x in 5..15 {
+            estimator.listen(&sight, Cell::new(x, 10), [held]);
+        }
+        assert_eq!(estimator.for_tokens(), ChannelOffset::NONE);
     }
 }

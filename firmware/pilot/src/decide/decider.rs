@@ -47,6 +47,11 @@ impl Decider {
         self.fell_back = false;
     }
 
+    /// Whether the policy was asked in this mission. Until then it has the channel of the one before.
+    pub(crate) const fn has_begun(&self) -> bool {
+        !self.begins
+    }
+
     /// The policy's best action among those that the guard allows.
     ///
     /// # Errors

@@ -110,7 +110,7 @@ impl<P: Policy> Deliberator for P {
 #[derive(Clone, Debug)]
 pub struct ChannelAware<P> {
     policy: P,
-    estimator: ChannelEstimator,
+    estimator: ChannelEstimator<MAX_DEVICES>,
     /// Whether the mission has a map; without one every link would count as unobstructed.
     has_map: bool,
 }

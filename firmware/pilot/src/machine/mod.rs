@@ -92,7 +92,8 @@ impl Machine {
         let outcome = self.step(now, late, inputs, policy, &mut out);
         self.apply(now, outcome, inputs, &mut out);
         self.send_target(now, inputs, &mut out);
-        let snr_off = policy.channel().map(|channel| channel.gain_db[1]);
+        let channel = policy.channel().filter(|_| self.decider.has_begun());
+        let snr_off = channel.map(|channel| channel.gain_db[1]);
         self.report(now, inputs, snr_off, &mut out);
         out
     }

@@ -39,7 +39,10 @@ impl Machine {
             Request::Engage if inputs.vehicle.failsafe => {
                 out.say(Severity::Warning, format_args!("gleaner: refused, autopilot failsafe"));
             }
-            Request::Engage => self.enter(Phase::Waiting(Wait::new(now, inputs.vehicle)), out),
+            Request::Engage => {
+                self.decider.begin_mission();
+                self.enter(Phase::Waiting(Wait::new(now, inputs.vehicle)), out);
+            }
             Request::Shadow => {
                 self.decider.begin_mission();
                 self.enter(Phase::Shadow(Shadow::default()), out);
@@ -65,7 +68,6 @@ impl Machine {
                     _ => Default::default(),
                 };
                 self.energy.open(plan.battery);
-                self.decider.begin_mission();
                 let flight = Flight::new(now, plan, stream, inputs.vehicle.position);
                 self.enter(Phase::Flying(flight), out);
                 self.announce_touchdown(now, inputs, out);

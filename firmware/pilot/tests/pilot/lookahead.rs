@@ -2,8 +2,11 @@
 
 use crate::bench::Bench;
 use crate::rig::{Rig, Scripted, mission};
+use gleaner_link::FlightMode;
 use gleaner_lookahead::ChannelModel;
-use gleaner_pilot::{Budget, ChannelAware, Decision, LookAheadRecord, LookingAhead, Mission, Source, State};
+use gleaner_pilot::{
+    Budget, ChannelAware, Decision, LookAheadRecord, LookingAhead, Mission, Request, Source, State,
+};
 use gleaner_policy::ChannelOffset;
 use gleaner_units::{Action, Cell, Db};
 
@@ -174,6 +177,13 @@ fn network_alone_sees_the_yields_of_a_weaker_channel() {
     let mut board = on_a_board();
     board.run(30.0);
     assert!(board.telemetry.unwrap().snr_off.is_some());
+    // The next mission has heard nothing yet.
+    board.vehicle.mode = Some(FlightMode::Hold);
+    board.run(1.0);
+    board.request = Some(Request::Engage);
+    board.step();
+    let telemetry = (0..40).find_map(|_| board.step().telemetry).unwrap();
+    assert_eq!((board.state(), telemetry.snr_off), (State::Waiting, None));
 }
 
 #[test]
