@@ -209,9 +209,8 @@ fn scenario_name(settings: &Settings) -> String {
     }
     if settings.share_mismatched > 0.0 {
         all += &format!(
-            "; {:.0} % of the others with noise off by up to 6 dB or exponents by up to 0.3, half of them with a wrong \
-             map or none",
-            100.0 * settings.share_mismatched
+            "; {:.0} % of all with noise off by up to 6 dB or exponents by up to 0.3, half of them with a wrong map or none",
+            100.0 * settings.share_mismatched * (1.0 - settings.share_cities)
         );
     }
     all

@@ -3,7 +3,7 @@
 
 use crate::env::flight::Flight;
 use crate::env::mismatch::{MapError, Mismatch};
-use crate::judge::evaluation::{Decider, DeciderError, Engine, fly_all, fly_all_as, fly_greedy};
+use crate::judge::evaluation::{Decider, DeciderError, fly_all, fly_all_as, fly_greedy};
 use crate::judge::interval::Interval;
 use crate::judge::lookahead::LookingAhead;
 use crate::judge::paper::Setting;
@@ -150,7 +150,7 @@ impl Arena {
             let missions = fly_all(&self.world, &self.drawn, &[Preference::ENERGY], decider)?;
             Ok(missions.0.last().into_iter().flatten().map(|total| -total[1]).collect())
         };
-        let network = fly(&mut Engine(&mut *policy))?;
+        let network = fly(&mut LookingAhead::new(&mut *policy, Budget::NONE))?;
         Ok([network, fly(&mut LookingAhead::new(policy, budget))?])
     }
 

@@ -98,7 +98,7 @@ fn final_table(report: &Report, kind: ScenarioKind) -> Markup {
             } }
             figcaption {
                 "Mean over the seeds ± sample standard deviation, on the realizations of the curves above; GREEDY on "
-                (report.realizations) " evaluation realizations. No parameters are selected: the last ones count. From " code { "trainings.csv" } "."
+                (report.realizations) " evaluation realizations. No parameters are selected: the last ones count, or those after the steps that all seeds have reached. From " code { "trainings.csv" } "."
             }
         }
     }

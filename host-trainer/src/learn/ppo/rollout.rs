@@ -11,7 +11,7 @@ use crate::observe::tokens;
 use crate::planner::{Prospect, Rates, W_DATA_MAX};
 use crate::settings::Settings;
 use gleaner_lookahead::{ChannelEstimator, ChannelModel, FitSettings};
-use gleaner_policy::{ChannelOffset, Preference, View};
+use gleaner_policy::{ChannelOffset, K_MAX, Preference, View};
 use gleaner_units::{Action, ActionMask};
 use gleaner_world::{ScenarioKind, Stream};
 use rand_chacha::ChaCha8Rng;
@@ -51,8 +51,9 @@ pub(super) struct RolloutFlight {
     pub view: View,
     pub actions: Vec<u8>,
     pub flight: Flight,
-    /// As on board: fits the channel to the reports, on the map. `None` where the map is missing.
-    pub estimator: Option<ChannelEstimator>,
+    /// As on board: fits the channel to the reports, on the map. `None` where the map is missing, and in runs without worlds
+    /// that differ, whose tokens are those of the nominal channel.
+    pub estimator: Option<ChannelEstimator<K_MAX>>,
     pub prospect: Prospect,
     /// The planner's value of the current state, utility.
     pub planner_value: f32,
@@ -69,6 +70,8 @@ pub(super) struct Missions {
     /// Rate tables of the planner, by setting.
     rates: Vec<Rates>,
     has_return_base: bool,
+    /// Whether the policy sees the channel that is estimated in flight.
+    estimates: bool,
     constants: PpoSettings,
 }
 
@@ -79,6 +82,7 @@ impl Missions {
             rates: variety.settings().map(|setting| Rates::new(setting.site.world().clone())).collect(),
             variety,
             has_return_base: settings.share_rb > 0.0,
+            estimates: settings.share_mismatched > 0.0,
             constants,
         }
     }
@@ -101,7 +105,7 @@ impl Missions {
             Some(table) => flight.with_table(table),
             None => flight,
         };
-        let has_map = setting.mismatch.map != MapError::Flat;
+        let estimates = self.estimates && setting.mismatch.map != MapError::Flat;
         let mut prospect = Prospect::new(self.rates[index].study(&drawn.realization), mission);
         let planner_value = prospect.value(&flight);
         Ok(RolloutFlight {
@@ -109,7 +113,7 @@ impl Missions {
             view: View::ALL[(round + place) as usize % View::ALL.len()],
             actions: Vec::new(),
             flight,
-            estimator: has_map.then(|| ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT)),
+            estimator: estimates.then(|| ChannelEstimator::new(ChannelModel::NOMINAL, FitSettings::DEFAULT)),
             prospect,
             planner_value,
             is_prompted: false,
