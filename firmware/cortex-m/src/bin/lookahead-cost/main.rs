@@ -93,7 +93,12 @@ fn measure() -> Option<()> {
     let rays = Rays { heights, altitude_m: 60 };
     print("begin", ticks(|| planner.begin(Some(&rays as &dyn Sight), &devices, 1)));
     let (mut cell, mut battery) = (Cell::new(4, 6), 100.0);
-    for _ in 0..DECISIONS {
+    for slot in 0..DECISIONS {
+        // A new report of each device: equal ones would be held ones.
+        let change_db = if slot % 2 == 0 { 0.25 } else { -0.25 };
+        for device in &mut devices {
+            device.snr = device.snr.map(|snr| Db(snr.0 + change_db));
+        }
         let view = View {
             cell,
             battery: BatteryUnits(battery),
