@@ -172,16 +172,13 @@ fn a_ground_station_on_its_own_port_is_served() {
     ground.hello();
     // The autopilot's heartbeats are forwarded, and ours arrive as well.
     let mut senders = BTreeSet::new();
-    for _ in 0..100 {
+    let _ = (0..100).find_map(|_| {
         autopilot.send_state();
         ground.drain(|sender, message| {
             senders.extend(matches!(message, Message::Heartbeat(_)).then_some(sender.component));
             (senders.len() == 2).then_some(())
-        });
-        if senders.len() == 2 {
-            break;
-        }
-    }
+        })
+    });
     assert_eq!(senders, BTreeSet::from([1, 191]));
     let (code, rest) = running.stop();
     assert_eq!(code, Some(0), "{rest}");

@@ -103,7 +103,7 @@ fn a_blocked_or_closed_console_does_not_stop_the_flight() {
         let fixture = Fixture::new();
         let (messages, stderr) = std::io::pipe().unwrap();
         let child = fixture.gleaner("run").env("RUST_LOG", "trace").stderr(stderr).spawn().unwrap();
-        let mut process = Process(child);
+        let mut process = Process::new(child);
         let mut messages = BufReader::new(messages);
         let mut line = String::new();
         while !line.contains("local address ") {
@@ -120,7 +120,7 @@ fn a_blocked_or_closed_console_does_not_stop_the_flight() {
         };
         autopilot.await_decision();
         process.signal("TERM");
-        assert_eq!(process.0.wait().unwrap().code(), Some(0), "held: {is_held}");
+        assert_eq!(process.child.wait().unwrap().code(), Some(0), "held: {is_held}");
     }
 }
 

@@ -114,7 +114,6 @@ pub struct Settings {
     /// refine: share of the other missions in a world that differs from what the aircraft assumes: noise off by up to 6 dB
     /// or path-loss exponents by up to 0.3, half of them with a wrong map or without one.
     #[arg(long, value_parser = share, default_value_t = 0.0)]
-    #[serde(skip_serializing_if = "is_zero")]
     pub share_mismatched: f64,
     /// How the twin critics are combined: `per-objective` takes the lower value of each objective, which may mix the
     /// two critics; `scalarised` takes both objectives from the critic with the lower w . Q, which is the value that
@@ -160,11 +159,6 @@ impl FromStr for TwinMinimum {
             .find(|rule| rule.to_string() == name)
             .ok_or_else(|| "use per-objective or scalarised".to_owned())
     }
-}
-
-/// Left out of a file, so that runs from before this setting continue.
-fn is_zero(share: &f64) -> bool {
-    *share == 0.0
 }
 
 /// A share on the command line.

@@ -65,7 +65,6 @@ impl From<SettingsV1> for Settings {
             share_rb: old.share_rb,
             share_varied: old.share_varied,
             share_cities: old.share_cities,
-            share_mismatched: 0.0,
             ..Settings::default()
         }
     }
